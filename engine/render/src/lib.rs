@@ -1,0 +1,1 @@
+//! Large-terrain streaming for wgpu.
