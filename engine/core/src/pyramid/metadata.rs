@@ -1,0 +1,105 @@
+//! What a pyramid says of itself: the attributes of its root `zarr.json`.
+
+use serde::{Deserialize, Serialize};
+
+use crate::geo::{Crs, Grid, WorldFrame};
+
+/// Heights' zero: never guessed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum VerticalReference {
+    /// Above the ellipsoid.
+    Ellipsoidal,
+    /// Above a geoid.
+    Orthometric,
+    /// The sources do not say.
+    #[default]
+    Unknown,
+}
+
+/// A file the pyramid was built from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SourceMetadata {
+    /// File name, without folders.
+    pub name: String,
+    /// Size of the file.
+    pub bytes: u64,
+    /// BLAKE3 of the file, in hexadecimal.
+    pub blake3: String,
+}
+
+/// One level of the pyramid.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Level {
+    /// Rows and columns of tiles.
+    pub tiles: [u32; 2],
+    /// Height units a code step: q.
+    pub step: i32,
+    /// True when the cage is stored whole, in units, and not as codes against the subdivided parent.
+    pub key: bool,
+    /// Bytes a cage number: 1, 2 or 4.
+    pub cage_bytes: u8,
+    /// Bytes a residual code: 1, 2 or 4.
+    pub detail_bytes: u8,
+    /// True when records carry void bits.
+    pub voids: bool,
+}
+
+/// The imagery of a pyramid.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ColorMetadata {
+    /// Number of colour levels, 0 the coarsest; colour tile `l/r/c` covers the same ground as height tile `l/r/c`.
+    pub levels: u8,
+    /// Texels a side of a colour tile; the border texels lie on the tile's border and are shared with neighbours.
+    pub texels: u32,
+    /// The imagery's file names.
+    pub sources: Vec<SourceMetadata>,
+}
+
+/// What a pyramid says of itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Metadata {
+    /// Version of the profile; [`Metadata::VERSION`].
+    pub version: u32,
+    /// The finest level's sample points.
+    pub grid: Grid,
+    /// Coordinates of the grid.
+    pub crs: Crs,
+    /// Zero of the heights.
+    pub vertical: VerticalReference,
+    /// The height unit u is 2^this metres.
+    pub unit_exponent: i32,
+    /// Greatest distance of a stored finest sample from its source, metres.
+    pub eps: f64,
+    /// Least and greatest height of finest samples that are not void, in units.
+    pub height_range: [i32; 2],
+    /// The levels, coarsest first.
+    pub levels: Vec<Level>,
+    /// Imagery, where there is any.
+    pub color: Option<ColorMetadata>,
+    /// What it was built from, in the order given.
+    pub sources: Vec<SourceMetadata>,
+}
+
+impl Metadata {
+    /// The version of the profile this crate reads and writes.
+    pub const VERSION: u32 = 1;
+
+    /// One height unit in metres.
+    #[must_use]
+    pub fn unit(&self) -> f64 {
+        f64::from(self.unit_exponent).exp2()
+    }
+
+    /// The world of the data set.
+    #[must_use]
+    pub fn frame(&self) -> WorldFrame {
+        WorldFrame::new(&self.grid, &self.crs)
+    }
+
+    /// The finest level.
+    #[must_use]
+    pub fn finest(&self) -> u8 {
+        self.grid.level_count() - 1
+    }
+}
