@@ -291,3 +291,114 @@ fn write_parts(cage: &Cage, text: &mut String) -> fmt::Result {
 fn written(sharpness: f64) -> f64 {
     sharpness.min(crate::subdiv::INFINITE_SHARPNESS)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Cage, CageError> {
+        read_obj(text.as_bytes(), CageBudget::default())
+    }
+
+    const QUADS: &str = "# two quads\nv 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 1 0\r\nv 1 1 0.1\nv 2 1 1e-3 1.0\nvt 0 0\n\
+        f 1/1/1 2//2 5/1 4\nf -5 -4 -1 -2\nt crease 2/1/0 1 4 2.5\nt corner 1/1/0 2 11\nt hole 1/0/0 1\n\
+        t interpolateboundary 1/0/0 1\n";
+
+    #[test]
+    fn slashes_negative_numbers_and_tags_are_understood() {
+        let cage = read(QUADS).unwrap();
+        let topology = cage.topology();
+        assert_eq!(topology.face_vertices(1), [1, 2, 5, 4]);
+        assert_eq!(
+            topology.edge_sharpness(topology.edge_between(1, 4).unwrap()),
+            2.5
+        );
+        assert_eq!(topology.vertex_sharpness(2), f64::INFINITY);
+        assert!(topology.is_hole(1) && !topology.is_hole(0));
+    }
+
+    #[test]
+    fn what_is_written_reads_back_equal() {
+        let cage = read(QUADS).unwrap();
+        let again = read(&write_obj(&cage)).unwrap();
+        assert_eq!(again.positions(), cage.positions());
+        assert_eq!(again.topology(), cage.topology());
+    }
+
+    #[test]
+    fn errors_name_their_line() {
+        let cases = [
+            (
+                "v 0 0 0\nv 1 0\n",
+                "line 2: a vertex needs three coordinates: \"end of line\"",
+            ),
+            (
+                "v 0 0 x\n",
+                "line 1: a vertex needs three coordinates: \"x\"",
+            ),
+            (
+                "v 0 nan 0\n",
+                "line 1: vertex 0 is at [0.0, NaN, 0.0]; coordinates must be finite and at most 1e150 in size",
+            ),
+            (
+                "v 0 0 0\nf 0 1 2\n",
+                "line 2: vertices of faces are counted from 1: \"0\"",
+            ),
+            (
+                "v 0 0 0\n\nf 1 2 3\n",
+                "line 3: face 0 names vertex 1, but there are only 1 vertices",
+            ),
+            (
+                "v 0 0 0\nf 1 2 1000000000000\n",
+                "line 2: face 0 names vertex 1000000000000, but there are only 1 vertices",
+            ),
+            (
+                "v 0 0 0\nt crease 2/1/0 0 1 -1\n",
+                "line 2: sharpness -1 of a tag; sharpness is a number from 0 to 10, 10 and more being infinite",
+            ),
+            (
+                "t crease 1000000000/1/0 0\n",
+                "line 1: a tag has fewer numbers than it says: \"1000000000/1/0\"",
+            ),
+            (
+                "t hole 1/0/0 -1\n",
+                "line 1: a tag's vertices and faces are counted from 0: \"-1\"",
+            ),
+            ("", "the cage has no faces"),
+        ];
+        for (text, message) in cases {
+            assert_eq!(read(text).unwrap_err().to_string(), message, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn a_budget_is_kept() {
+        let budget = CageBudget {
+            vertices: 5,
+            corners: 8,
+        };
+        let error = read_obj(QUADS.as_bytes(), budget).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "line 7: the cage has more than 5 vertices, the budget of this reader"
+        );
+        let budget = CageBudget {
+            vertices: 6,
+            corners: 7,
+        };
+        assert!(
+            read_obj(QUADS.as_bytes(), budget)
+                .unwrap_err()
+                .to_string()
+                .starts_with("line 10:")
+        );
+    }
+
+    #[test]
+    fn no_cut_of_a_file_panics() {
+        for end in 0..QUADS.len() {
+            let _ = read(&QUADS[..end]);
+        }
+        assert!(read_obj(b"\xff\xfe v f\nv \xff 0 0\n", CageBudget::default()).is_err());
+    }
+}
