@@ -13,13 +13,24 @@
 //! M. Nießner, C. Loop, M. Meyer, T. DeRose, *Feature-adaptive GPU rendering of Catmull-Clark subdivision surfaces*
 //! (2012).
 
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "cages have fewer than 2^32 corners (checked by `Cage::new`), corners and sides fewer than five"
+)]
+
+mod evaluate;
+mod execute;
 mod feature;
 mod mesh;
 mod patch;
 mod refine;
 mod rows;
 mod tables;
+#[cfg(test)]
+mod testing;
 
+pub use evaluate::Sample;
+pub use execute::Real;
 pub use feature::{FeatureKind, features};
 pub use patch::{Cap, CapRing, Patch, Place, RenderTable};
 pub use rows::{BlendRow, LevelRows, PointCounts};

@@ -127,7 +127,7 @@ pub(super) fn add_patches(source: &Source<'_>, rows: &mut LevelRows, table: &mut
                 None => own_grid(mesh, face, sharp),
                 Some((above, children)) => child_grid(above, children, mesh, face, sharp),
             };
-            fill_phantoms(&mut grid, rows);
+            fill_phantoms(&mut grid, sharp, rows);
             table.patches.push(Patch {
                 place,
                 controls: grid,
@@ -273,24 +273,42 @@ const fn split(side: u32) -> (usize, usize) {
     (side as usize / 4, side as usize % 4)
 }
 
-/// Twice the point on the border less the one within, first beyond the left and right columns, then rows.
-fn fill_phantoms(grid: &mut [u32; 16], rows: &mut LevelRows) {
-    let mut fill = |at: usize, border: usize, within: usize| {
-        if grid[at] == NONE && grid[border] != NONE && grid[within] != NONE {
+/// Fills what lies beyond sharp sides with twice the point on the side less the one within: columns beyond the left and
+/// right sides whole, then rows.
+fn fill_phantoms(grid: &mut [u32; 16], sharp: u8, rows: &mut LevelRows) {
+    let mut fill = |beyond: usize, border: usize, within: usize| {
+        if grid[beyond] == NONE && grid[border] != NONE {
             let wanted = [grid[border], grid[within]];
-            grid[at] = rows.end_point();
+            grid[beyond] = rows.end_point();
             rows.phantoms.push(wanted);
         }
     };
-    for inner in [1, 2] {
-        fill(4 * inner, 4 * inner + 1, 4 * inner + 2);
-        fill(4 * inner + 3, 4 * inner + 2, 4 * inner + 1);
-        fill(inner, 4 + inner, 8 + inner);
-        fill(12 + inner, 8 + inner, 4 + inner);
+    let is_sharp = |side: usize| sharp >> side & 1 == 1;
+    for (_, column, inward) in [(3, 0, 1), (1, 3, -1)]
+        .into_iter()
+        .filter(|(side, ..)| is_sharp(*side))
+    {
+        for row in 0..4_usize {
+            let at = 4 * row + column;
+            fill(
+                at,
+                at.wrapping_add_signed(inward),
+                at.wrapping_add_signed(2 * inward),
+            );
+        }
     }
-    for column in [0, 3] {
-        fill(column, 4 + column, 8 + column);
-        fill(12 + column, 8 + column, 4 + column);
+    for (_, row, inward) in [(0, 0, 4), (2, 12, -4)]
+        .into_iter()
+        .filter(|(side, ..)| is_sharp(*side))
+    {
+        for column in 0..4_usize {
+            let at = row + column;
+            fill(
+                at,
+                at.wrapping_add_signed(inward),
+                at.wrapping_add_signed(2 * inward),
+            );
+        }
     }
 }
 

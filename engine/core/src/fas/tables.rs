@@ -139,29 +139,10 @@ fn build(topology: &Topology, depths: &[u8]) -> Tables {
 
 #[cfg(test)]
 mod tests {
-    use std::{fs, path::PathBuf};
+    use std::fs;
 
     use super::*;
-    use crate::cage::{Cage, CageBudget, read_obj};
-
-    fn reference(name: &str) -> Option<PathBuf> {
-        let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-            .join("../../../shared/reference/catmull-clark");
-        if folder.is_dir() {
-            return Some(folder.join(name));
-        }
-        assert!(
-            std::env::var_os("CI").is_none(),
-            "no ../shared/reference in CI"
-        );
-        println!("skipped: no ../shared/reference");
-        None
-    }
-
-    fn cage(name: &str) -> Option<Cage> {
-        let path = reference(&format!("{name}.obj"))?;
-        Some(read_obj(&fs::read(path).expect("a file"), CageBudget::default()).expect("a cage"))
-    }
+    use crate::fas::testing::{cage, reference};
 
     /// One row of counts.csv from tables.
     fn counts(topology: &Topology, depth: u8) -> Vec<u32> {
