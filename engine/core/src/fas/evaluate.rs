@@ -268,8 +268,14 @@ mod tests {
                 "{name}: {exact} of {}",
                 cage.extent()
             );
+            // What is still semi-sharp at the last level is drawn as if it were smooth.
+            let topology = cage.topology();
+            let worn_off = (0..topology.edge_count())
+                .map(|edge| topology.edge_sharpness(edge))
+                .chain((0..topology.vertex_count()).map(|vertex| topology.vertex_sharpness(vertex)))
+                .all(|sharpness| sharpness <= f64::from(depth) || sharpness.is_infinite());
             assert!(
-                vertices <= 1e-12 * cage.extent(),
+                !worn_off || vertices <= 1e-12 * cage.extent(),
                 "{name}, vertices: {vertices}"
             );
         }
