@@ -199,7 +199,10 @@ fn bernstein_derivative(t: f64) -> [f64; 4] {
 mod tests {
     use super::super::{Tables, testing::cage};
 
-    fn samples(name: &str) -> Vec<(u32, [f64; 2], String, i32, [f64; 3])> {
+    /// Face, (u, v), kind, level and position of a reference sample.
+    type Row = (u32, [f64; 2], String, i32, [f64; 3]);
+
+    fn samples(name: &str) -> Vec<Row> {
         let path =
             super::super::testing::reference(&format!("{name}.csv")).expect("the caller looked");
         let text = std::fs::read_to_string(path).expect("a file");
