@@ -10,9 +10,11 @@ mod build;
 mod error;
 mod obj;
 mod topology;
+mod uniform;
 
 pub use build::{Corner, Crease, Faces, Tags};
 pub use error::CageError;
 
 pub use obj::{CageBudget, read_obj, write_obj};
 pub use topology::{Cage, NONE, Topology};
+pub use uniform::refine;
