@@ -27,6 +27,16 @@ pub(super) struct Jet {
 }
 
 impl Patch {
+    /// Position at (u, v) in the unit square.
+    pub(super) fn position(&self, u: f64, v: f64) -> [f64; 3] {
+        let (bu, bv) = (basis(u), basis(v));
+        let mut position = DVec3::ZERO;
+        for (row, bv) in self.controls.chunks_exact(4).zip(bv) {
+            position += bv * (row[0] * bu[0] + row[1] * bu[1] + row[2] * bu[2] + row[3] * bu[3]);
+        }
+        position.to_array()
+    }
+
     /// Evaluates at (u, v) in the unit square.
     pub(super) fn evaluate(&self, u: f64, v: f64) -> Jet {
         let (bu, bv, du, dv) = (basis(u), basis(v), basis_derivative(u), basis_derivative(v));
