@@ -8,11 +8,15 @@
 
 mod build;
 mod error;
+mod limit;
 mod obj;
 mod topology;
+mod uniform;
 
 pub use build::{Corner, Crease, Faces, Tags};
 pub use error::CageError;
 
+pub use limit::{LimitSample, LimitSurface, Place};
 pub use obj::{CageBudget, read_obj, write_obj};
 pub use topology::{Cage, NONE, Topology};
+pub use uniform::refine;
