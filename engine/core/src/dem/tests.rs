@@ -220,6 +220,56 @@ fn height_maps_without_georeference_have_their_heights() {
 }
 
 #[test]
+fn older_formats_have_the_same_heights() {
+    let Some(folder) = shared("dem") else { return };
+    let options = OpenOptions::default();
+    let golden = golden(&folder.join("variants"), "GOLDEN_300x260_i16le.raw");
+    let float_grid = open(&folder.join("derived/rainier_south_300x260.flt"), &options).expect("flt");
+    assert_eq!(read_all(&*float_grid).expect("flt"), golden);
+    assert_eq!(float_grid.header().grid.origin, [-121.45, 46.4]);
+    assert_eq!(float_grid.header().crs.code.as_deref(), Some("EPSG:4326"));
+
+    let dem = open(&folder.join("SainteHelens.dem"), &options).expect("dem");
+    let asc = open(&folder.join("derived/SainteHelens.asc"), &options).expect("asc");
+    // The text was made from the corners of the quadrangle, a row more on either side than there are heights.
+    let (grid, framed) = (dem.header().grid, asc.header().grid);
+    assert_eq!((grid.columns, grid.rows, framed.rows), (327, 466, 468));
+    assert_eq!(grid.origin, framed.position(1.0, 0.0));
+    assert_eq!(asc.header().crs.kind, CrsKind::Projected);
+    let mut inner = vec![0.0; 466 * 327];
+    asc.read(Window { row: 1, ..Window::whole(&grid) }, &mut inner).expect("asc");
+    let pairs = read_all(&*dem).expect("dem").into_iter().zip(inner);
+    let (mut known, mut void) = (0, 0);
+    for (a, b) in pairs {
+        assert!(a == b || (a.is_nan() && b.is_nan()), "{a} {b}");
+        *(if a.is_nan() { &mut void } else { &mut known }) += 1;
+    }
+    assert!(known > 100_000 && void > 1_000 && dem.header().integer && asc.header().integer);
+
+    let bil = open(&folder.join("gabilan.bil"), &options).expect("bil");
+    let asc = open(&folder.join("derived/gabilan_300x260_f32.asc"), &options).expect("asc");
+    let [row, column] = bil.header().grid.row_column(asc.header().grid.origin).map(|place| place.round());
+    let mut window = vec![0.0; 300 * 260];
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in the grid")]
+    let place = Window { row: row as u32, column: column as u32, rows: 260, columns: 300 };
+    bil.read(place, &mut window).expect("bil");
+    let asc = read_all(&*asc).expect("asc");
+    assert!(window.iter().zip(&asc).all(|(a, b)| (a - b).abs() < 1e-3));
+
+    let dted = open(&folder.join("n43.dt0"), &options).expect("dt0");
+    let grid = dted.header().grid;
+    assert_eq!((grid.columns, grid.rows, grid.origin), (121, 121, [-80.0, 44.0]));
+    let known: Vec<f64> = read_all(&*dted).expect("dt0").into_iter().filter(|height| !height.is_nan()).collect();
+    let range = known.iter().fold((f64::MAX, f64::MIN), |(a, b), &h| (a.min(h), b.max(h)));
+    assert_eq!(range, (75.0, 460.0));
+
+    // No void mark is declared, and -9999 is the format's own.
+    let hugo = heights(&folder.join("hugo_site_filled.asc"), &options).expect("asc");
+    assert!(hugo.iter().any(|height| height.is_nan()) && hugo.iter().all(|height| !(*height < 0.0)));
+    assert!(heights(&folder.join("srtmgl3_rockies_degrees.asc"), &options).is_ok_and(|heights| heights[0] == 2569.0));
+}
+
+#[test]
 fn srtm_tiles_join_without_a_seam_and_the_later_wins() {
     let Some(folder) = shared("dem") else { return };
     let tile = |name: &str| open(&folder.join(name), &OpenOptions::default()).expect(name);
