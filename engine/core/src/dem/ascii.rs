@@ -56,7 +56,7 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
     let scaling = Scaling::new(Some(nodata), options.scale.unwrap_or(1.0), 0.0);
     let whole = heights.iter().all(|height| height.fract() == 0.0 || scaling.height(*height).is_nan());
     let parts = Parts { columns, rows, placement: Some(placement), crs: wkt::beside(path)?, whole, scaling };
-    Memory::new(bytes, options, parts, Samples::F64(heights))
+    Memory::raster(bytes, options, parts, Samples::F64(heights))
 }
 
 fn read_heights(path: &Path, words: SplitAsciiWhitespace<'_>, count: u64) -> Result<Vec<f64>, DemError> {

@@ -62,7 +62,7 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
         whole: true,
         scaling: Scaling::new(options.nodata.or(Some(VOID)), options.scale.unwrap_or(1.0), 0.0),
     };
-    Memory::new(bytes, options, parts, Samples::I16(heights))
+    Memory::raster(bytes, options, parts, Samples::I16(heights))
 }
 
 /// A height whose first bit is its sign; some writers use two's complement, told by depths no sea has.

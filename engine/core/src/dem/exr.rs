@@ -57,7 +57,7 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
         whole,
         scaling: Scaling::new(options.nodata, options.scale.unwrap_or(1.0), 0.0),
     };
-    Memory::new(bytes, options, parts, samples)
+    Memory::raster(bytes, options, parts, samples)
 }
 
 /// Refuses a data window that the file cannot fill or memory cannot hold, before any is taken.

@@ -37,7 +37,7 @@ pub(super) fn open(bytes: Bytes, options: &OpenOptions) -> Result<Box<dyn Raster
         scaling: Scaling::new(options.nodata.or(Some(VOID)), options.scale.unwrap_or(1.0), 0.0),
     };
     let rows = Rows { offset: 0, stride: u64::from(columns) * 2, kind: SampleType::I16, big_endian: true };
-    Plain::new(bytes, options, parts, rows)
+    Plain::raster(bytes, options, parts, rows)
 }
 
 /// Latitude and longitude of the south-west corner, from a name as `N46W122.hgt` or `s05e010.SRTMGL1.hgt`.

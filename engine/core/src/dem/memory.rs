@@ -19,7 +19,7 @@ pub(super) struct Memory {
     flip: Flip,
 }
 
-/// What a format's reader knows of a raster, to be completed by [`Memory::new`].
+/// What a format's reader knows of a raster, to be completed by [`Memory::raster`].
 pub(super) struct Parts {
     pub(super) columns: u32,
     pub(super) rows: u32,
@@ -49,7 +49,7 @@ impl Parts {
 
 impl Memory {
     /// A raster of samples in stored order.
-    pub(super) fn new(
+    pub(super) fn raster(
         bytes: &Bytes,
         options: &OpenOptions,
         parts: Parts,

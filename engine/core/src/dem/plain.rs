@@ -28,7 +28,7 @@ pub(super) struct Plain {
 
 impl Plain {
     /// Checks that all rows lie in the file.
-    pub(super) fn new(
+    pub(super) fn raster(
         bytes: Bytes,
         options: &OpenOptions,
         parts: Parts,

@@ -47,7 +47,7 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
         whole: true,
         scaling: Scaling::new(options.nodata, options.scale.unwrap_or(1.0), 0.0),
     };
-    Memory::new(bytes, options, parts, samples)
+    Memory::raster(bytes, options, parts, samples)
 }
 
 /// Deflate makes at most 1,032 bytes of one.

@@ -20,8 +20,8 @@ const MAX_HEADER_BYTES: u64 = 1 << 16;
 pub(super) fn header_beside(path: &Path) -> Option<PathBuf> {
     let longer = path.extension().map(|extension| format!("{}.hdr", extension.to_string_lossy()));
     let candidates = [Some("hdr".to_owned()), Some("HDR".to_owned()), longer];
-    let path = candidates.iter().flatten().map(|ending| path.with_extension(ending)).find(|c| c.is_file() && c != path);
-    path
+    let mut candidates = candidates.iter().flatten().map(|ending| path.with_extension(ending));
+    candidates.find(|candidate| candidate.is_file() && candidate != path)
 }
 
 /// Opens a raster by the header beside it.
@@ -42,7 +42,7 @@ pub(super) fn open(bytes: Bytes, header: &Path, options: &OpenOptions) -> Result
         options.scale.unwrap_or(1.0),
         0.0,
     );
-    Plain::new(bytes, options, parts, rows)
+    Plain::raster(bytes, options, parts, rows)
 }
 
 /// Keys (in lower case) and values of a header.

@@ -265,7 +265,7 @@ fn older_formats_have_the_same_heights() {
 
     // No void mark is declared, and -9999 is the format's own.
     let hugo = heights(&folder.join("hugo_site_filled.asc"), &options).expect("asc");
-    assert!(hugo.iter().any(|height| height.is_nan()) && hugo.iter().all(|height| !(*height < 0.0)));
+    assert!(hugo.iter().any(|height| height.is_nan()) && hugo.iter().all(|height| height.is_nan() || *height >= 0.0));
     assert!(heights(&folder.join("srtmgl3_rockies_degrees.asc"), &options).is_ok_and(|heights| heights[0] == 2569.0));
 }
 
@@ -298,6 +298,6 @@ fn imagery_comes_with_its_place() {
         assert_eq!(image.rgb.len(), image.width as usize * image.height as usize, "{name}");
         assert!(image.rgb.iter().any(|rgb| rgb[0] != rgb[2]), "{name}");
     }
-    let text = open_image(&folder.join("SainteHelens.dem")).err().expect("not an image");
+    let text = open_image(&folder.join("SainteHelens.dem")).expect_err("not an image");
     assert!(text.to_string().contains("not an image"));
 }

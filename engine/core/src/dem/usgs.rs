@@ -59,7 +59,7 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
     let south = profiles.iter().map(|profile| profile.start[1]).fold(f64::MAX, f64::min);
     let rows = ((north - south) / dy).round() + 1.0;
     let columns = profiles.len() as u64;
-    if !(rows >= 1.0 && rows <= 1e6) {
+    if !(1.0..=1e6).contains(&rows) {
         return Err(damaged(format!("profiles from {south} to {north} in steps of {dy}")));
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 1 to a million")]
@@ -69,7 +69,7 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
     let mut samples = vec![f64::NAN; columns as usize * rows as usize];
     for (column, profile) in profiles.iter().enumerate() {
         let start = (north - profile.start[1]) / dy;
-        if (start - start.round()).abs() > 0.01 || !(start >= 0.0 && start < f64::from(rows)) {
+        if (start - start.round()).abs() > 0.01 || !(0.0..f64::from(rows)).contains(&start) {
             return Err(damaged(format!("profile {} does not lie on the grid", column + 1)));
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "less than the rows")]
@@ -80,7 +80,7 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
     }
     let placement = Placement { origin: [west * angle, north * angle], step: [dx * angle, -dy * angle] };
     let parts = Parts { columns, rows, placement: Some(placement), crs, whole, scaling };
-    Memory::new(bytes, options, parts, Samples::F64(samples))
+    Memory::raster(bytes, options, parts, Samples::F64(samples))
 }
 
 fn read_profiles(file: &[u8], dz: f64) -> Result<Vec<Profile>, String> {

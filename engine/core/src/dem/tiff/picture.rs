@@ -32,9 +32,11 @@ pub(in super::super) fn read_picture(bytes: &Bytes, ifd: &Ifd) -> Result<(u32, u
     let coding = Coding::read(bytes, ifd, if apart { 1 } else { bands })?;
     let jpeg = coding.compression == JPEG;
     let unsupported = if jpeg { None } else { coding.unsupported() };
-    let odd = || (coding.format != 1 || !matches!(coding.bits, 8 | 16)).then(|| "an image of other than 8 or 16 bits");
-    if let Some(what) = unsupported.or_else(|| odd().map(Into::into)) {
+    if let Some(what) = unsupported {
         return Err(DemError::unsupported(bytes.path(), what));
+    }
+    if coding.format != 1 || !matches!(coding.bits, 8 | 16) {
+        return Err(DemError::unsupported(bytes.path(), "an image of other than 8 or 16 bits, unsigned"));
     }
     if jpeg && (apart || coding.bits != 8 || !matches!(bands, 1 | 3)) {
         return Err(DemError::unsupported(bytes.path(), "JPEG compression of other than grey or YCbCr"));
