@@ -16,7 +16,12 @@ const DEFAULT_VOID: f64 = -9999.0;
 
 /// True when the bytes begin like the header of a grid.
 pub(super) fn matches(head: &[u8]) -> bool {
-    let text: Vec<u8> = head.trim_ascii_start().iter().take(5).map(u8::to_ascii_lowercase).collect();
+    let text: Vec<u8> = head
+        .trim_ascii_start()
+        .iter()
+        .take(5)
+        .map(u8::to_ascii_lowercase)
+        .collect();
     text == b"ncols" || text == b"nrows"
 }
 
@@ -36,7 +41,10 @@ struct Header {
 pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raster>, DemError> {
     let file = bytes.whole(MAX_FILE_BYTES)?;
     let text = str::from_utf8(&file).map_err(|error| {
-        DemError::format(bytes.path(), format!("byte {} is not text", error.valid_up_to()))
+        DemError::format(
+            bytes.path(),
+            format!("byte {} is not text", error.valid_up_to()),
+        )
     })?;
     let path = bytes.path();
     let (header, words) = Header::read(text).map_err(|what| DemError::format(path, what))?;
@@ -47,25 +55,46 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
     let count = u64::from(columns) * u64::from(rows);
     // A digit and a space each: so no memory is taken for heights that cannot be there.
     if count > file.len() as u64 / 2 + 1 {
-        let what = format!("{} bytes cannot hold {columns} x {rows} heights", file.len());
+        let what = format!(
+            "{} bytes cannot hold {columns} x {rows} heights",
+            file.len()
+        );
         return Err(DemError::format(path, what));
     }
     let heights = read_heights(path, words, count)?;
-    let placement = header.placement(rows).map_err(|what| DemError::format(path, what))?;
+    let placement = header
+        .placement(rows)
+        .map_err(|what| DemError::format(path, what))?;
     let nodata = options.nodata.or(header.nodata).unwrap_or(DEFAULT_VOID);
     let scaling = Scaling::new(Some(nodata), options.scale.unwrap_or(1.0), 0.0);
-    let whole = heights.iter().all(|height| height.fract() == 0.0 || scaling.height(*height).is_nan());
-    let parts = Parts { columns, rows, placement: Some(placement), crs: wkt::beside(path)?, whole, scaling };
+    let whole = heights
+        .iter()
+        .all(|height| height.fract() == 0.0 || scaling.height(*height).is_nan());
+    let parts = Parts {
+        columns,
+        rows,
+        placement: Some(placement),
+        crs: wkt::beside(path)?,
+        whole,
+        scaling,
+    };
     Memory::raster(bytes, options, parts, Samples::F64(heights))
 }
 
-fn read_heights(path: &Path, words: SplitAsciiWhitespace<'_>, count: u64) -> Result<Vec<f64>, DemError> {
+fn read_heights(
+    path: &Path,
+    words: SplitAsciiWhitespace<'_>,
+    count: u64,
+) -> Result<Vec<f64>, DemError> {
     let count = usize::try_from(count).unwrap_or(usize::MAX);
     let mut heights = Vec::with_capacity(count);
     for word in words.take(count) {
         let height = word.parse().map_err(|_| {
             let word: String = word.chars().take(20).collect();
-            DemError::format(path, format!("height {} is {word:?}, not a number", heights.len() + 1))
+            DemError::format(
+                path,
+                format!("height {} is {word:?}, not a number", heights.len() + 1),
+            )
         })?;
         heights.push(height);
     }
@@ -83,14 +112,23 @@ impl Header {
         let mut words = text.split_ascii_whitespace();
         loop {
             let rest = words.clone();
-            let Some(key) = words.next() else { return Ok((header, rest)) };
-            if !key.starts_with(|first: char| first.is_ascii_alphabetic()) || key.eq_ignore_ascii_case("nan") {
+            let Some(key) = words.next() else {
+                return Ok((header, rest));
+            };
+            if !key.starts_with(|first: char| first.is_ascii_alphabetic())
+                || key.eq_ignore_ascii_case("nan")
+            {
                 return Ok((header, rest));
             }
             let value = words.next().unwrap_or("");
             let number = value.parse::<f64>().ok();
-            let number = number.ok_or_else(|| format!("header line {key} says {value:?}, not a number"))?;
-            let count = || value.parse::<u32>().map_err(|_| format!("header line {key} says {value:?}"));
+            let number =
+                number.ok_or_else(|| format!("header line {key} says {value:?}, not a number"))?;
+            let count = || {
+                value
+                    .parse::<u32>()
+                    .map_err(|_| format!("header line {key} says {value:?}"))
+            };
             match key.to_ascii_lowercase().as_str() {
                 "ncols" => header.columns = Some(count()?),
                 "nrows" => header.rows = Some(count()?),
@@ -108,13 +146,20 @@ impl Header {
     }
 
     fn placement(&self, rows: u32) -> Result<Placement, String> {
-        let [Some(x), Some(y)] = self.step else { return Err("the header has no cellsize".into()) };
+        let [Some(x), Some(y)] = self.step else {
+            return Err("the header has no cellsize".into());
+        };
         let (Some(west), Some(south)) = (self.west, self.south) else {
             return Err("the header has no xllcorner and yllcorner".into());
         };
-        let sample = |(edge, is_sample): (f64, bool), step: f64| if is_sample { edge } else { edge + 0.5 * step };
+        let sample = |(edge, is_sample): (f64, bool), step: f64| {
+            if is_sample { edge } else { edge + 0.5 * step }
+        };
         let north = sample(south, y) + y * f64::from(rows.saturating_sub(1));
-        Ok(Placement { origin: [sample(west, x), north], step: [x, -y] })
+        Ok(Placement {
+            origin: [sample(west, x), north],
+            step: [x, -y],
+        })
     }
 }
 
@@ -125,10 +170,17 @@ mod tests {
     #[test]
     fn corners_and_centres_are_told_apart() {
         for (kind, west) in [("corner", 5.0), ("center", 0.0)] {
-            let text = format!("NCOLS 2\nnrows 3\nxll{kind} 0\nyll{kind} 100\ncellsize 10\n1 2 3 4 5 6");
+            let text =
+                format!("NCOLS 2\nnrows 3\nxll{kind} 0\nyll{kind} 100\ncellsize 10\n1 2 3 4 5 6");
             let (header, words) = Header::read(&text).expect("a header");
             let placement = header.placement(3).expect("placed");
-            assert_eq!(placement, Placement { origin: [west, 120.0 + west], step: [10.0, -10.0] });
+            assert_eq!(
+                placement,
+                Placement {
+                    origin: [west, 120.0 + west],
+                    step: [10.0, -10.0]
+                }
+            );
             assert_eq!(words.count(), 6);
         }
     }

@@ -27,7 +27,9 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
     let damaged = |what: &str| DemError::format(bytes.path(), format!("DTED: {what}"));
     let head = bytes.head(80)?;
     let number = |first: usize, count: usize| -> Result<u32, DemError> {
-        let text = head.get(first..first + count).and_then(|field| str::from_utf8(field).ok());
+        let text = head
+            .get(first..first + count)
+            .and_then(|field| str::from_utf8(field).ok());
         let number = text.and_then(|text| text.trim().parse().ok());
         number.ok_or_else(|| damaged(&format!("no number at byte {first} of the header")))
     };
@@ -42,7 +44,9 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
     let column_bytes = COLUMN_HEAD + rows as usize * 2 + COLUMN_TAIL;
     let needed = HEADER_BYTES + columns as usize * column_bytes;
     if (needed as u64) > bytes.len() {
-        return Err(damaged(&format!("truncated: {columns} x {rows} heights need {needed} bytes")));
+        return Err(damaged(&format!(
+            "truncated: {columns} x {rows} heights need {needed} bytes"
+        )));
     }
     let file = bytes.head(needed as u64)?;
     let (width, height) = (columns as usize, rows as usize);
@@ -50,17 +54,25 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
     for (column, data) in file[HEADER_BYTES..].chunks_exact(column_bytes).enumerate() {
         let (stored, _) = data[COLUMN_HEAD..column_bytes - COLUMN_TAIL].as_chunks();
         for (row, &value) in stored.iter().enumerate() {
-            heights[(height - 1 - row) * width + column] = signed_magnitude(u16::from_be_bytes(value));
+            heights[(height - 1 - row) * width + column] =
+                signed_magnitude(u16::from_be_bytes(value));
         }
     }
     let north = south + step[1] * f64::from(rows.saturating_sub(1));
     let parts = Parts {
         columns,
         rows,
-        placement: Some(Placement { origin: [west, north], step: [step[0], -step[1]] }),
+        placement: Some(Placement {
+            origin: [west, north],
+            step: [step[0], -step[1]],
+        }),
         crs: Crs::wgs84(),
         whole: true,
-        scaling: Scaling::new(options.nodata.or(Some(VOID)), options.scale.unwrap_or(1.0), 0.0),
+        scaling: Scaling::new(
+            options.nodata.or(Some(VOID)),
+            options.scale.unwrap_or(1.0),
+            0.0,
+        ),
     };
     Memory::raster(bytes, options, parts, Samples::I16(heights))
 }
@@ -80,8 +92,11 @@ fn signed_magnitude(stored: u16) -> i16 {
 /// Degrees of `DDDMMSSH`.
 fn angle(field: &[u8]) -> Option<f64> {
     let text = str::from_utf8(field).ok()?;
-    let number = |first: usize, count: usize| text.get(first..first + count)?.trim().parse::<u16>().ok();
-    let degrees = f64::from(number(0, 3)?) + f64::from(number(3, 2)?) / 60.0 + f64::from(number(5, 2)?) / 3600.0;
+    let number =
+        |first: usize, count: usize| text.get(first..first + count)?.trim().parse::<u16>().ok();
+    let degrees = f64::from(number(0, 3)?)
+        + f64::from(number(3, 2)?) / 60.0
+        + f64::from(number(5, 2)?) / 3600.0;
     match field.get(7)? {
         b'N' | b'E' => Some(degrees),
         b'S' | b'W' => Some(-degrees),

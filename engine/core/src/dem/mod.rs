@@ -78,12 +78,18 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Raster>, DemEr
         return usgs::open(&bytes, options);
     }
     // These have nothing to be told by but their names and what lies beside them.
-    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hgt")) {
+    if path
+        .extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("hgt"))
+    {
         return hgt::open(bytes, options);
     }
     if let Some(header) = raw::header_beside(path) {
         return raw::open(bytes, &header, options);
     }
     let known = "GeoTIFF, SRTM (.hgt), PNG, EXR, DTED, ESRI ASCII grid, USGS DEM, or .flt and .bil with .hdr";
-    Err(DemError::format(path, format!("not an elevation model of a known format ({known})")))
+    Err(DemError::format(
+        path,
+        format!("not an elevation model of a known format ({known})"),
+    ))
 }
