@@ -1,5 +1,8 @@
 //! Whole files: the shared rasters against their known heights, and every awkward file against panics.
 
+mod damage;
+mod written;
+
 use std::fs;
 use std::panic::catch_unwind;
 use std::path::{Path, PathBuf};
