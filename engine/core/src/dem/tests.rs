@@ -194,6 +194,25 @@ fn georeference_scale_and_voids_come_out() {
 }
 
 #[test]
+fn outside_an_internal_mask_is_void() {
+    let Some(folder) = shared("dem/variants") else {
+        return;
+    };
+    let golden = golden(&folder, "GOLDEN_300x260_i16le.raw");
+    let path = folder.join("o_internal_mask_disc.tif");
+    let masked = heights(&path, &OpenOptions::default()).expect("readable");
+    let mut known = 0;
+    for (index, (height, golden)) in masked.iter().zip(&golden).enumerate() {
+        let (row, column) = (index / 300, index % 300);
+        let radius = (row as f64 - 129.5).hypot(column as f64 - 149.5);
+        assert!(height.is_nan() || height == golden);
+        assert!((radius - 120.0).abs() < 2.0 || height.is_nan() == (radius > 120.0));
+        known += usize::from(!height.is_nan());
+    }
+    assert_eq!(known, 45_225);
+}
+
+#[test]
 fn what_cannot_be_placed_is_refused_or_takes_the_caller_s_spacing() {
     let Some(folder) = shared("dem/variants") else {
         return;
