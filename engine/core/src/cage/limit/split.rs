@@ -135,6 +135,7 @@ fn vertex_sample(limit: VertexLimit, q: usize, origin: DVec3, scale: f64) -> Lim
     }
 }
 
+#[inline]
 pub(super) fn sample(jet: Jet, origin: DVec3, scale: f64) -> LimitSample {
     LimitSample {
         position: (origin + jet.position).to_array(),

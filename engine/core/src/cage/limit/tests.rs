@@ -144,7 +144,7 @@ fn refining_a_cage_does_not_change_its_surface() {
     for face in (0..cage.topology().face_count())
         .filter(|&face| cage.topology().face_vertices(face).len() == 4)
     {
-        let first = cage.topology().face_corners(face).start as u32;
+        let first = u32::try_from(cage.topology().face_corners(face).start).unwrap();
         for (u, v) in [(0.1, 0.3), (0.0, 0.01), (0.25, 0.0), (0.5, 0.5)] {
             let (whole, quarter) = (
                 surface.evaluate(face, u, v).unwrap(),
