@@ -20,7 +20,7 @@ pub use error::CageError;
 pub use faces::{Corner, Crease, Faces, Tags};
 
 pub use info::CageInfo;
-pub use limit::{LimitSample, LimitSurface, Place};
+pub use limit::{LimitPattern, LimitSample, LimitSurface, Place};
 pub use obj::{CageBudget, read_obj, write_obj};
 pub use topology::{Cage, NONE, Topology};
 pub use uniform::refine;

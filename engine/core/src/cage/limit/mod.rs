@@ -17,9 +17,11 @@
 
 mod faces;
 mod patch;
+mod pattern;
 mod power;
 mod regular;
 mod ring;
+mod shape;
 mod split;
 mod vertex;
 
@@ -33,6 +35,8 @@ use self::split::{Scratch, sample};
 use super::error::CageError;
 use super::topology::Cage;
 use super::uniform::refine;
+
+pub use self::pattern::LimitPattern;
 
 /// A place on the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
