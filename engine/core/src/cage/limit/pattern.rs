@@ -32,6 +32,11 @@ struct Stencils {
     jet: Vec<Weights>,
 }
 
+/// Controls a pattern may have: so many a face on average, and some for a few poles of high valence, each of whose faces
+/// depends on the whole ring.
+const CONTROLS_A_FACE: u64 = 64;
+const CONTROLS_OF_POLES: u64 = 1 << 22;
+
 /// Places that are evaluated on every face of an all-quad cage.
 #[derive(Debug)]
 pub struct LimitPattern {
@@ -47,7 +52,7 @@ impl LimitPattern {
     /// Prepares places, as (u, v) in the unit square, on all faces of a topology; holes are faces like any other here.
     ///
     /// # Errors
-    /// [`CageError::Place`] for a place outside the square, and for a face that is no quad or has an inner corner of
+    /// [`CageError::Budget`] where faces depend on too many controls; [`CageError::Place`] for a place outside the square, and for a face that is no quad or has an inner corner of
     /// valence 2; [`refine`](super::super::refine) a cage with such faces first.
     pub fn new(topology: &Topology, places: &[[f64; 2]]) -> Result<Self, CageError> {
         let inside = |place: &[f64; 2]| place.iter().all(|x| (0.0..=1.0).contains(x));
@@ -66,6 +71,8 @@ impl LimitPattern {
             controls: Vec::with_capacity(17 * topology.face_count() as usize),
             vertex_count: topology.vertex_count(),
         };
+        let limit = CONTROLS_OF_POLES + CONTROLS_A_FACE * u64::from(topology.face_count());
+        let limit = limit.min(u64::from(u32::MAX));
         let (mut known, mut words) = (HashMap::new(), Vec::new());
         for face in 0..topology.face_count() {
             let fits = topology.face_vertices(face).len() == 4
@@ -77,6 +84,12 @@ impl LimitPattern {
                     u: 0.0,
                     v: 0.0,
                     reason,
+                });
+            }
+            if pattern.controls.len() as u64 > limit {
+                return Err(CageError::Budget {
+                    what: "controls of limit stencils",
+                    limit,
                 });
             }
             key(topology, face, &mut words);
@@ -125,8 +138,9 @@ impl LimitPattern {
         out
     }
 
-    /// Limit samples, face by face and place by place. At extraordinary vertices derivatives are the limit tangents,
-    /// as of [`LimitSurface`](super::LimitSurface); normals of creases of one face and the like need that too.
+    /// Limit samples, face by face and place by place. At extraordinary vertices derivatives are the limit tangents, as
+    /// of [`LimitSurface`](super::LimitSurface). The normal is their product always: zero at a crease's vertex with one
+    /// face on that side, where both tangents are one line.
     ///
     /// # Panics
     /// When there are fewer positions than the topology has vertices.
