@@ -4,8 +4,11 @@
 
 mod error;
 mod metadata;
+mod record;
+pub mod surface;
 mod tile;
 
 pub use error::PyramidError;
 pub use metadata::{ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};
+pub use record::{Record, RecordLayout, RecordParts, VOID_BYTES, number_bytes};
 pub use tile::{Summary, Tile};
