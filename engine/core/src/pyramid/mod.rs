@@ -17,6 +17,8 @@ mod tile;
 mod validate;
 mod writer;
 mod zarr;
+#[cfg(test)]
+mod zarr_python;
 
 pub use error::PyramidError;
 pub use metadata::{ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};

@@ -152,6 +152,7 @@ impl Place {
             reason = "at least 0 and under `samples`"
         )]
         let index = cell as u32;
+        #[expect(clippy::cast_possible_truncation, reason = "it is 128")]
         let cells = TILE_CELLS as u32;
         Some(Self {
             tile: index / cells,

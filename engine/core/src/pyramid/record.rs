@@ -80,6 +80,16 @@ impl RecordLayout {
             + TILE_SAMPLE_COUNT * self.detail_bytes as usize
     }
 
+    /// Lengths of what follows each other in a record and is of one kind: for whoever compresses it.
+    pub(super) fn sections(&self) -> [usize; 4] {
+        [
+            ID_BYTES + 5 * SUMMARY_BYTES + PATCH_COUNT,
+            if self.voids { VOID_BYTES } else { 0 },
+            CAGE_CONTROL_COUNT * usize::from(self.cage_bytes),
+            TILE_SAMPLE_COUNT * usize::from(self.detail_bytes),
+        ]
+    }
+
     /// The bytes of a record.
     ///
     /// # Panics

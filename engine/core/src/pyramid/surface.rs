@@ -214,13 +214,13 @@ pub fn base_height_32(controls: &[i32], row: usize, column: usize) -> i32 {
     let column_weights = LIMIT_WEIGHTS[column % QUAD_SAMPLES];
     let mut high = 0;
     let mut low = 0;
-    for a in 0..4 {
-        for b in 0..4 {
+    for (a, row_weight) in row_weights.into_iter().enumerate() {
+        for (b, column_weight) in column_weights.into_iter().enumerate() {
             // The last row and column have weight 0 for the control that would lie outside.
             let i = (row / QUAD_SAMPLES + a).min(CAGE_CONTROLS - 1);
             let j = (column / QUAD_SAMPLES + b).min(CAGE_CONTROLS - 1);
             let control = controls[i * CAGE_CONTROLS + j];
-            let weight = row_weights[a] * column_weights[b];
+            let weight = row_weight * column_weight;
             high += weight * (control >> 12);
             low += weight * (control & 4095);
         }

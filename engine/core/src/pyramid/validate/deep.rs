@@ -226,7 +226,6 @@ impl<'a> Deep<'a> {
 }
 
 /// A tile, or its record where the cage cannot be decoded.
-#[expect(clippy::large_enum_variant, reason = "one at a time")]
 enum Found {
     Whole(Tile),
     Record(Record),

@@ -106,7 +106,7 @@ pub fn validate(
     let total = shards + if deep { tile_count(metadata) } else { 0 };
     check_nodes(path, metadata, &mut report);
     check_shards(path, metadata, &mut report, &mut |done| {
-        progress(done, total)
+        progress(done, total);
     });
     if deep {
         let progress = &mut |done| progress(shards + done, total);
@@ -188,7 +188,7 @@ fn check_shards(
     rest.iter().for_each(|key| {
         report.add(format!(
             "the manifest lists {key:?}, which this pyramid does not have"
-        ))
+        ));
     });
 }
 

@@ -188,7 +188,7 @@ fn void_borders_that_differ_are_found() {
 #[test]
 fn summaries_that_disagree_with_parents_children_and_heights_are_found() {
     let (_folder, path) = written_with(1, |record| {
-        record.bytes[20..24].copy_from_slice(&0_f32.to_le_bytes())
+        record.bytes[20..24].copy_from_slice(&0_f32.to_le_bytes());
     });
     let report = check(&path, true);
     assert!(
@@ -197,7 +197,7 @@ fn summaries_that_disagree_with_parents_children_and_heights_are_found() {
         report.findings
     );
     let (_folder, path) = written_with(2, |record| {
-        record.bytes[12..16].copy_from_slice(&1_i32.to_le_bytes())
+        record.bytes[12..16].copy_from_slice(&1_i32.to_le_bytes());
     });
     assert!(finds(&check(&path, true), "outside its own range"));
 }
