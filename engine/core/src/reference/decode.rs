@@ -70,7 +70,7 @@ fn code(upload: &[u32], row: usize, column: usize) -> i32 {
 }
 
 /// The limit surface in units, rounded half up: (Σ w K + 73,728) / 147,456, in 32 bits by halves of K.
-fn base_height(upload: &[u32], row: usize, column: usize) -> i32 {
+pub(super) fn base_height(upload: &[u32], row: usize, column: usize) -> i32 {
     let row_weights = LIMIT_WEIGHTS[row % QUAD_SAMPLES];
     let column_weights = LIMIT_WEIGHTS[column % QUAD_SAMPLES];
     let (mut high, mut low) = (0, 0);
@@ -106,6 +106,11 @@ fn residual(upload: &[u32], quantum: i32, row: usize, column: usize) -> i32 {
     let left = even_column_residual(upload, quantum, row, column - 1);
     let right = even_column_residual(upload, quantum, row, column + 1);
     ((left + right) >> 1) + quantum * code(upload, row, column)
+}
+
+/// A sample's residual without its own code, for those who make codes.
+pub(super) fn code_prediction(upload: &[u32], quantum: i32, row: usize, column: usize) -> i32 {
+    residual(upload, quantum, row, column) - quantum * code(upload, row, column)
 }
 
 /// What goes into the slot as it came: voids, patch codes, controls.
@@ -278,6 +283,7 @@ fn patch_strides(samples: &Samples<'_>, patch: usize) -> [u32; 2] {
         .fold(0, u32::max);
     [samples.cell_deviation([row, column], 4), worst]
 }
+
 
 #[cfg(test)]
 mod tests;

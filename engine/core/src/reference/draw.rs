@@ -125,5 +125,6 @@ fn fill(image: &mut [f32], size: [usize; 2], clip: [Vec4; 3]) {
     }
 }
 
+
 #[cfg(test)]
 mod tests;

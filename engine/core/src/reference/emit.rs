@@ -262,5 +262,6 @@ pub fn write(
     draw_list[INSTANCE_COUNT_WORD] = 1;
 }
 
+
 #[cfg(test)]
 mod tests;
