@@ -17,17 +17,34 @@ use super::shared::{
 
 /// 2^(n / 2): what nibble n of a patch code multiplies.
 const CODE_FACTORS: [f32; 15] = [
-    1.0, 1.414_213_56, 2.0, 2.828_427_12, 4.0, 5.656_854_25, 8.0, 11.313_708_5, 16.0, 22.627_417, 32.0, 45.254_834,
-    64.0, 90.509_668, 128.0,
+    1.0,
+    1.414_213_56,
+    2.0,
+    2.828_427_12,
+    4.0,
+    5.656_854_25,
+    8.0,
+    11.313_708_5,
+    16.0,
+    22.627_417,
+    32.0,
+    45.254_834,
+    64.0,
+    90.509_668,
+    128.0,
 ];
 const CODE_NEVER: u32 = 15;
 const NEVER: f32 = 3.0e38;
 
 /// Metres from the camera (the origin) to a patch's box.
 fn patch_distance(tile: &DrawnTile, patch: u32) -> f32 {
-    let cell = [patch % TILE_QUADS * QUAD_SAMPLES, patch / TILE_QUADS * QUAD_SAMPLES];
+    let cell = [
+        patch % TILE_QUADS * QUAD_SAMPLES,
+        patch / TILE_QUADS * QUAD_SAMPLES,
+    ];
     let step = Vec2::from(tile.step);
-    let near = Vec2::new(tile.origin[0], tile.origin[1]) + Vec2::new(cell[0] as f32, cell[1] as f32) * step;
+    let near = Vec2::new(tile.origin[0], tile.origin[1])
+        + Vec2::new(cell[0] as f32, cell[1] as f32) * step;
     let far = near + QUAD_SAMPLES as f32 * step;
     let low = near.min(far).extend(tile.z_min);
     let high = near.max(far).extend(tile.z_max);
@@ -41,7 +58,11 @@ fn patch_error(tile: &DrawnTile, pages: &Pages<'_>, patch: u32, depth: u32, tole
         return stride_error; // a parent in its child's place: nothing is within, its own samples decide
     }
     let code = pool_code(pages, tile.slot, patch, depth);
-    let bound = if code == CODE_NEVER { NEVER } else { tile.error * CODE_FACTORS[code as usize] };
+    let bound = if code == CODE_NEVER {
+        NEVER
+    } else {
+        tile.error * CODE_FACTORS[code as usize]
+    };
     bound.min(tile.geometric_error + stride_error)
 }
 
@@ -62,7 +83,8 @@ fn patch_depth(frame: &Frame, tile: &DrawnTile, pages: &Pages<'_>, patch: u32) -
 pub fn depth(frame: &Frame, tiles: &[DrawnTile], pages: &Pages<'_>, depths: &mut [u32]) {
     for (tile, drawn) in tiles.iter().enumerate().take(frame.drawn_count as usize) {
         for patch in 0..PATCH_COUNT {
-            depths[tile * PATCH_COUNT as usize + patch as usize] = patch_depth(frame, drawn, pages, patch);
+            depths[tile * PATCH_COUNT as usize + patch as usize] =
+                patch_depth(frame, drawn, pages, patch);
         }
     }
 }
@@ -79,7 +101,12 @@ mod tests {
     };
 
     /// Depth of patch 0, seen from straight above its corner, with stride errors and codes of its two depths.
-    fn depth_at(distance: f32, stride_errors: [f32; 2], codes: [u32; 2], geometric_error: f32) -> u32 {
+    fn depth_at(
+        distance: f32,
+        stride_errors: [f32; 2],
+        codes: [u32; 2],
+        geometric_error: f32,
+    ) -> u32 {
         let mut tile = scene(&[TileId::ROOT], 1.0, &|_, _| 0.0).tiles[0];
         (tile.z_min, tile.z_max) = (-distance - 10.0, -distance);
         (tile.geometric_error, tile.error) = (geometric_error, geometric_error.max(0.0625));
@@ -95,8 +122,17 @@ mod tests {
 
     #[test]
     fn a_patch_takes_the_least_depth_within_the_tolerance() {
-        for (distance, want) in [(64.0 * 5.0, 0), (64.0 * 4.9, 1), (64.0 * 3.0, 1), (64.0 * 2.9, 2)] {
-            assert_eq!(depth_at(distance, [4.0, 2.0], [15, 15], 1.0), want, "{distance}");
+        for (distance, want) in [
+            (64.0 * 5.0, 0),
+            (64.0 * 4.9, 1),
+            (64.0 * 3.0, 1),
+            (64.0 * 2.9, 2),
+        ] {
+            assert_eq!(
+                depth_at(distance, [4.0, 2.0], [15, 15], 1.0),
+                want,
+                "{distance}"
+            );
         }
     }
 

@@ -14,7 +14,9 @@ use crate::{
 };
 
 fn hills(east: f32, north: f32) -> f32 {
-    60.0 * (east / 170.0).sin() + 30.0 * (north / 61.0).cos() + 5.0 * ((east + 2.0 * north) / 17.0).sin()
+    60.0 * (east / 170.0).sin()
+        + 30.0 * (north / 61.0).cos()
+        + 5.0 * ((east + 2.0 * north) / 17.0).sin()
 }
 
 /// Three coarse quarters and four fine tiles, 1,024 metres a side.
@@ -51,8 +53,12 @@ fn slopes_are_equal_on_both_sides_of_every_border() {
                     tile,
                     at: place_in(&scene.tiles[tile as usize], Vec2::new(at[0], -at[1])),
                 };
-                let difference = ground_slope(&scene.tiles, &pages, place(one)) - ground_slope(&scene.tiles, &pages, place(other));
-                assert!(difference.length() < 1.0e-6, "tiles {one} and {other} at {at:?}: {difference}");
+                let difference = ground_slope(&scene.tiles, &pages, place(one))
+                    - ground_slope(&scene.tiles, &pages, place(other));
+                assert!(
+                    difference.length() < 1.0e-6,
+                    "tiles {one} and {other} at {at:?}: {difference}"
+                );
             }
         }
     }
@@ -62,12 +68,12 @@ fn slopes_are_equal_on_both_sides_of_every_border() {
 fn a_place_is_found_from_its_neighbours() {
     let (scene, _) = mixed();
     for (start, at, tile) in [
-        (0, [600.0, 700.0], 3),  // across a corner, coarse to fine
-        (1, [700.0, 530.0], 3),  // fine side, west half
-        (1, [900.0, 530.0], 4),  // fine side, east half
-        (4, [900.0, 500.0], 1),  // fine to coarse
-        (5, [800.0, 800.0], 6),  // same level
-        (3, [513.0, 511.9], 3),  // within half a sample
+        (0, [600.0, 700.0], 3), // across a corner, coarse to fine
+        (1, [700.0, 530.0], 3), // fine side, west half
+        (1, [900.0, 530.0], 4), // fine side, east half
+        (4, [900.0, 500.0], 1), // fine to coarse
+        (5, [800.0, 800.0], 6), // same level
+        (3, [513.0, 511.9], 3), // within half a sample
     ] {
         let here = locate(&scene.tiles, start, Vec2::new(at[0], -at[1]));
         assert_eq!(here.tile, tile, "from {start} at {at:?}");
@@ -79,7 +85,11 @@ fn from_above(drawn_count: u32, height: f32) -> Frame {
     let mut view = frame(drawn_count);
     let scale = 2.0;
     // w is the distance below the eye, at (512, -512, height).
-    let columns = [[scale, 0.0, 0.0, 0.0], [0.0, scale, 0.0, 0.0], [0.0, 0.0, 0.0, -1.0]];
+    let columns = [
+        [scale, 0.0, 0.0, 0.0],
+        [0.0, scale, 0.0, 0.0],
+        [0.0, 0.0, 0.0, -1.0],
+    ];
     let eye = [-512.0 * scale, 512.0 * scale, 0.1, height];
     view.clip_from_view_world = [columns[0], columns[1], columns[2], eye];
     view
@@ -99,13 +109,28 @@ fn ground_of_two_levels_has_no_holes_at_any_depths() {
     let mut head = vec![0; DRAW_LIST_WORDS];
     emit::count(&view, &scene.tiles, &patches, &mut head);
     let mut indices = vec![0; head[5] as usize];
-    emit::write(&view, &scene.tiles, &pages, &patches, &mut head, &mut indices);
+    emit::write(
+        &view,
+        &scene.tiles,
+        &pages,
+        &patches,
+        &mut head,
+        &mut indices,
+    );
     // Without skirts, so that nothing hides a hole.
     let is_ground = |t: &&[u32]| t.iter().all(|index| index & 0x7fff < SKIRT_FIRST);
-    let ground: Vec<u32> = indices[..head[INDEX_COUNT_WORD] as usize].chunks_exact(3).filter(is_ground).flatten().copied().collect();
+    let ground: Vec<u32> = indices[..head[INDEX_COUNT_WORD] as usize]
+        .chunks_exact(3)
+        .filter(is_ground)
+        .flatten()
+        .copied()
+        .collect();
     let image = rasterise(&view, &scene.tiles, &pages, &ground, [96, 96]);
     for (pixel, &distance) in image.iter().enumerate() {
-        assert!((780.0..1_000.0).contains(&distance), "pixel {pixel} sees {distance}");
+        assert!(
+            (780.0..1_000.0).contains(&distance),
+            "pixel {pixel} sees {distance}"
+        );
     }
 }
 
@@ -119,7 +144,12 @@ fn vertices_stand_on_their_samples_and_skirts_below() {
     assert_eq!([top.x, top.y], [1_024.0, -12.0]);
     assert!((top.z - hills(1_024.0, -12.0)).abs() <= view.unit / 2.0);
     // The east side follows the 128 places of the north side.
-    let below = vertex_position(&view, &scene.tiles, &pages, 1 << SAMPLE_BITS | (SKIRT_FIRST + 128 + 3));
+    let below = vertex_position(
+        &view,
+        &scene.tiles,
+        &pages,
+        1 << SAMPLE_BITS | (SKIRT_FIRST + 128 + 3),
+    );
     assert_eq!(below, top - Vec3::new(0.0, 0.0, scene.tiles[1].skirt));
 }
 
@@ -137,7 +167,10 @@ fn low_ground_is_green_high_ground_white_and_shade_darker() {
     assert!(low.y > low.x && low.y > low.z, "{low}");
     view.height_range = [-4_000.0, 100.0];
     let high = color(&view);
-    assert!(high.min_element() > 0.4 && high.max_element() < 1.3, "{high}");
+    assert!(
+        high.min_element() > 0.4 && high.max_element() < 1.3,
+        "{high}"
+    );
     view.sun = [0.0, 0.0, -1.0];
     assert!(color(&view).max_element() < 0.5 * high.max_element());
     view.haze = 1.0;

@@ -21,7 +21,12 @@ fn quarters(split: &[u32], absent: &[TileId]) -> Scene {
     let mut ids = Vec::new();
     for (quadrant, child) in (0..).zip(root.children()) {
         if split.contains(&quadrant) {
-            ids.extend(child.children().into_iter().filter(|id| !absent.contains(id)));
+            ids.extend(
+                child
+                    .children()
+                    .into_iter()
+                    .filter(|id| !absent.contains(id)),
+            );
         } else {
             ids.push(child);
         }
@@ -31,7 +36,11 @@ fn quarters(split: &[u32], absent: &[TileId]) -> Scene {
 
 /// Same level; each quarter split; opposite quarters split; three of them; one with a child missing.
 fn scenes() -> Vec<Scene> {
-    let mut all = vec![quarters(&[], &[]), quarters(&[0, 3], &[]), quarters(&[0, 1, 2], &[])];
+    let mut all = vec![
+        quarters(&[], &[]),
+        quarters(&[0, 3], &[]),
+        quarters(&[0, 1, 2], &[]),
+    ];
     all.extend((0..4).map(|quadrant| quarters(&[quadrant], &[])));
     all.push(quarters(&[3], &[TileId::new(2, 2, 3)]));
     all
@@ -76,11 +85,22 @@ fn emit(scene: &Scene, pages: &Pages<'_>, depths: &[u32], shift: u32) -> Emitted
     view.index_capacity = wanted;
     // With equal counts a lesser shift fits too.
     let mut indices = vec![0; wanted as usize];
-    write(&view, &scene.tiles, pages, &patches, &mut draw_list, &mut indices);
+    write(
+        &view,
+        &scene.tiles,
+        pages,
+        &patches,
+        &mut draw_list,
+        &mut indices,
+    );
     assert_eq!(draw_list[INDEX_COUNT_WORD], wanted, "as many as counted");
     assert_eq!(draw_list[CURSOR_WORD], wanted);
     assert_eq!(draw_list[INSTANCE_COUNT_WORD], 1);
-    Emitted { patches, draw_list, indices }
+    Emitted {
+        patches,
+        draw_list,
+        indices,
+    }
 }
 
 /// A vertex's place in half samples of the finest level of these scenes: row, column.
@@ -95,12 +115,17 @@ fn place(scene: &Scene, index: u32) -> [i64; 2] {
 }
 
 fn is_skirt(triangle: &[u32]) -> bool {
-    triangle.iter().any(|index| index & ((1 << SAMPLE_BITS) - 1) >= SKIRT_FIRST)
+    triangle
+        .iter()
+        .any(|index| index & ((1 << SAMPLE_BITS) - 1) >= SKIRT_FIRST)
 }
 
 /// Triangles of the surface: skirts come in pairs, the second with one vertex below.
 fn surface(emitted: &Emitted) -> impl Iterator<Item = &[u32]> {
-    emitted.indices.chunks_exact(3).filter(|triangle| !is_skirt(triangle))
+    emitted
+        .indices
+        .chunks_exact(3)
+        .filter(|triangle| !is_skirt(triangle))
 }
 
 /// Every edge has its opposite exactly once but on the data's border, whose length comes back.
@@ -109,13 +134,22 @@ fn assert_watertight(scene: &Scene, emitted: &Emitted) -> i64 {
     for triangle in surface(emitted) {
         for i in 0..3 {
             let edge = (triangle[i], triangle[(i + 1) % 3]);
-            assert!(edges.insert(edge), "an edge twice in one direction: {edge:?}");
+            assert!(
+                edges.insert(edge),
+                "an edge twice in one direction: {edge:?}"
+            );
         }
     }
     let mut border = 0;
-    for &(a, b) in edges.iter().filter(|edge| !edges.contains(&(edge.1, edge.0))) {
+    for &(a, b) in edges
+        .iter()
+        .filter(|edge| !edges.contains(&(edge.1, edge.0)))
+    {
         let (from, to) = (place(scene, a), place(scene, b));
-        assert!(is_on_border(scene, from, to), "open edge {from:?} to {to:?}");
+        assert!(
+            is_on_border(scene, from, to),
+            "open edge {from:?} to {to:?}"
+        );
         border += (from[0] - to[0]).abs() + (from[1] - to[1]).abs();
     }
     border
@@ -126,7 +160,9 @@ fn is_on_border(scene: &Scene, from: [i64; 2], to: [i64; 2]) -> bool {
     let covered = |row: i64, column: i64| {
         scene.ids.iter().any(|id| {
             let size = 128 << (2 - id.level);
-            let inside = |at: i64, tile: u32| at > i64::from(tile) * size * 2 && at < (i64::from(tile) + 1) * size * 2;
+            let inside = |at: i64, tile: u32| {
+                at > i64::from(tile) * size * 2 && at < (i64::from(tile) + 1) * size * 2
+            };
             inside(row, id.row) && inside(column, id.column)
         })
     };
@@ -139,7 +175,11 @@ fn is_on_border(scene: &Scene, from: [i64; 2], to: [i64; 2]) -> bool {
 }
 
 fn area(scene: &Scene) -> i64 {
-    scene.ids.iter().map(|id| (128_i64 << (2 - id.level)).pow(2)).sum()
+    scene
+        .ids
+        .iter()
+        .map(|id| (128_i64 << (2 - id.level)).pow(2))
+        .sum()
 }
 
 #[test]
@@ -163,7 +203,11 @@ fn every_edge_is_shared_by_two_triangles_and_the_ground_is_tiled_once() {
                     assert!(doubled > 0, "{a:?} {b:?} {c:?}");
                     twice += doubled;
                     for (&index, at) in triangle.iter().zip([a, b, c]) {
-                        assert_eq!(*owner.entry(at).or_insert(index), index, "two vertices at {at:?}");
+                        assert_eq!(
+                            *owner.entry(at).or_insert(index),
+                            index,
+                            "two vertices at {at:?}"
+                        );
                     }
                 }
                 assert_eq!(twice, 2 * area(&scene));
@@ -176,8 +220,18 @@ fn perimeter(scene: &Scene) -> i64 {
     let length = |(at, id): (u32, &TileId)| {
         let half = 64_i64 << (2 - id.level);
         let drawn = &scene.tiles[at as usize];
-        let sides = [drawn.side_north, drawn.side_east, drawn.side_south, drawn.side_west];
-        sides.iter().flatten().filter(|&&word| word == u32::MAX).count() as i64 * half
+        let sides = [
+            drawn.side_north,
+            drawn.side_east,
+            drawn.side_south,
+            drawn.side_west,
+        ];
+        sides
+            .iter()
+            .flatten()
+            .filter(|&&word| word == u32::MAX)
+            .count() as i64
+            * half
     };
     (0..).zip(&scene.ids).map(length).sum()
 }
@@ -186,7 +240,13 @@ fn perimeter(scene: &Scene) -> i64 {
 fn neighbours_differ_by_at_most_one_and_no_depth_is_lessened() {
     let mut state = 99;
     let mut seen = HashSet::new();
-    let across = |relation: u32, depth: u32| if relation == SIDE_COARSER { (depth + 1).min(2) } else { depth };
+    let across = |relation: u32, depth: u32| {
+        if relation == SIDE_COARSER {
+            (depth + 1).min(2)
+        } else {
+            depth
+        }
+    };
     for scene in scenes() {
         for kind in 0..3 {
             let depths = random_depths(scene.tiles.len(), kind, &mut state);
@@ -196,7 +256,10 @@ fn neighbours_differ_by_at_most_one_and_no_depth_is_lessened() {
                 for patch in 0..PATCH_COUNT {
                     let own = word_depth(emitted.patches[(tile * PATCH_COUNT + patch) as usize], 0);
                     let raw = depths[(tile * PATCH_COUNT + patch) as usize];
-                    assert!(own >= raw && own <= raw.max(1), "raised from 0 to 1 or not at all");
+                    assert!(
+                        own >= raw && own <= raw.max(1),
+                        "raised from 0 to 1 or not at all"
+                    );
                     for edge in EDGES {
                         let other = facing(&scene.tiles, tile, patch, edge);
                         if other.relation == SIDE_NONE {
@@ -205,7 +268,11 @@ fn neighbours_differ_by_at_most_one_and_no_depth_is_lessened() {
                         let at = (other.tile * PATCH_COUNT + other.second) as usize;
                         let theirs = word_depth(emitted.patches[at], 0);
                         let mine = across(other.relation, own);
-                        let theirs = if other.relation == SIDE_FINER { (theirs + 1).min(2) } else { theirs };
+                        let theirs = if other.relation == SIDE_FINER {
+                            (theirs + 1).min(2)
+                        } else {
+                            theirs
+                        };
                         assert!(mine.abs_diff(theirs) <= 1);
                         seen.insert((other.relation, edge, other.tile == tile, raw, depths[at]));
                     }
@@ -225,11 +292,20 @@ fn a_shift_is_the_same_as_lesser_depths() {
     for scene in scenes() {
         let depths = random_depths(scene.tiles.len(), 0, &mut state);
         for shift in 1..SHIFT_COUNT {
-            let lesser: Vec<u32> = depths.iter().map(|depth| depth.saturating_sub(shift)).collect();
-            let (at_shift, at_zero) = (emit(&scene, &pages, &depths, shift), emit(&scene, &pages, &lesser, 0));
+            let lesser: Vec<u32> = depths
+                .iter()
+                .map(|depth| depth.saturating_sub(shift))
+                .collect();
+            let (at_shift, at_zero) = (
+                emit(&scene, &pages, &depths, shift),
+                emit(&scene, &pages, &lesser, 0),
+            );
             assert_eq!(at_shift.indices, at_zero.indices);
             let classes = CLASS_COUNTS_WORD..CLASS_COUNTS_WORD + 6;
-            assert_eq!(at_shift.draw_list[classes.clone()], at_zero.draw_list[classes]);
+            assert_eq!(
+                at_shift.draw_list[classes.clone()],
+                at_zero.draw_list[classes]
+            );
         }
     }
 }
@@ -243,9 +319,19 @@ fn past_the_last_shift_nothing_is_drawn() {
     let mut draw_list = vec![0; DRAW_LIST_WORDS];
     count(&view, &scene.tiles, &patches, &mut draw_list);
     // 2 triangles a patch; a skirt of 2 more along the outer border of 8 × 32 patches.
-    assert_eq!(draw_list[SHIFT_COUNTS_WORD + 2], 3 * (2 * 4 * 1_024 + 2 * 8 * 32));
+    assert_eq!(
+        draw_list[SHIFT_COUNTS_WORD + 2],
+        3 * (2 * 4 * 1_024 + 2 * 8 * 32)
+    );
     assert_eq!(chosen_shift(&view, &draw_list), SHIFT_COUNT);
-    write(&view, &scene.tiles, &[&[], &[], &[], &[]], &patches, &mut draw_list, &mut []);
+    write(
+        &view,
+        &scene.tiles,
+        &[&[], &[], &[], &[]],
+        &patches,
+        &mut draw_list,
+        &mut [],
+    );
     assert_eq!(draw_list[..5], [0, 1, 0, 0, 0]);
 }
 
@@ -258,7 +344,11 @@ fn triangles_with_a_void_corner_shrink_to_a_point() {
     let sample = 8 * 129 + 8;
     words[2 * SLOT_WORDS + crate::reference::shared::VOIDS_WORD + sample / 32] = 1 << (sample % 32);
     let emitted = emit(&scene, &[&words, &[], &[], &[]], &[2; 4 * 1_024], 0);
-    let points = emitted.indices.chunks_exact(3).filter(|t| t[0] == t[1] && t[1] == t[2]).count();
+    let points = emitted
+        .indices
+        .chunks_exact(3)
+        .filter(|t| t[0] == t[1] && t[1] == t[2])
+        .count();
     assert_eq!(points, 6);
 }
 
@@ -267,13 +357,23 @@ fn skirts_hang_below_every_border_but_those_of_equal_level() {
     let scene = quarters(&[3], &[]);
     let words = vec![0; 16 * SLOT_WORDS];
     let emitted = emit(&scene, &[&words, &[], &[], &[]], &[2; 7 * 1_024], 0);
-    let skirts = emitted.indices.chunks_exact(3).filter(|triangle| is_skirt(triangle)).count();
+    let skirts = emitted
+        .indices
+        .chunks_exact(3)
+        .filter(|triangle| is_skirt(triangle))
+        .count();
     // Vertices along the outer border: 12 coarse half sides of 64 cells, 4 fine sides of 128; along the level border 4
     // coarse half sides of 64 and 4 fine sides of 64.
     assert_eq!(skirts, 2 * (12 * 64 + 4 * 128 + 4 * 64 + 4 * 64));
-    let top = surface(&emitted).flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])]).collect::<HashSet<_>>();
+    let top = surface(&emitted)
+        .flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])])
+        .collect::<HashSet<_>>();
     let mut hanging = 0;
-    for triangle in emitted.indices.chunks_exact(3).filter(|triangle| is_skirt(triangle)) {
+    for triangle in emitted
+        .indices
+        .chunks_exact(3)
+        .filter(|triangle| is_skirt(triangle))
+    {
         // The second triangle of a skirt ends with the edge it hangs from, against the surface's direction.
         let edge = (triangle[0], triangle[2]);
         if !is_skirt(&[edge.0, edge.1]) {

@@ -5,8 +5,8 @@
 use std::collections::HashMap;
 
 use super::{
-    DrawnTile, Frame, NONE, SIDE_COARSER, SIDE_FINER, SIDE_SAME, SLOT_WORDS, TILE_VISIBLE, UPLOAD_CONTROLS_WORD,
-    UPLOAD_DETAIL_WORD, UPLOAD_WORDS, UploadHeader,
+    DrawnTile, Frame, NONE, SIDE_COARSER, SIDE_FINER, SIDE_SAME, SLOT_WORDS, TILE_VISIBLE,
+    UPLOAD_CONTROLS_WORD, UPLOAD_DETAIL_WORD, UPLOAD_WORDS, UploadHeader,
 };
 use crate::{
     geo::{CAGE_CONTROLS, QUAD_SAMPLES, TILE_CELLS, TILE_SAMPLES, TileId},
@@ -50,21 +50,49 @@ pub fn scene(ids: &[TileId], spacing: f32, relief: &dyn Fn(f32, f32) -> f32) -> 
     }
     let mut staging = vec![0; slots.len() * UPLOAD_WORDS];
     let mut headers = Vec::new();
-    for ((slot, &id), words) in (0..).zip(&slots).zip(staging.chunks_exact_mut(UPLOAD_WORDS)) {
+    for ((slot, &id), words) in (0..)
+        .zip(&slots)
+        .zip(staging.chunks_exact_mut(UPLOAD_WORDS))
+    {
         stage_ground(id, spacing, relief, words);
         let step = step_of(id, spacing);
-        headers.push(UploadHeader { slot, quantum: 1, unit: UNIT, reserved: 0, step, reserved_2: [0.0; 2] });
+        headers.push(UploadHeader {
+            slot,
+            quantum: 1,
+            unit: UNIT,
+            reserved: 0,
+            step,
+            reserved_2: [0.0; 2],
+        });
     }
-    let slot_of = |id: TileId| (0..).zip(&slots).find(|slot| *slot.1 == id).map_or(NONE, |slot| slot.0);
-    let tiles = ids.iter().map(|&id| drawn_tile(id, spacing, &places, &slot_of)).collect();
-    Scene { ids: ids.to_vec(), tiles, headers, staging }
+    let slot_of = |id: TileId| {
+        (0..)
+            .zip(&slots)
+            .find(|slot| *slot.1 == id)
+            .map_or(NONE, |slot| slot.0)
+    };
+    let tiles = ids
+        .iter()
+        .map(|&id| drawn_tile(id, spacing, &places, &slot_of))
+        .collect();
+    Scene {
+        ids: ids.to_vec(),
+        tiles,
+        headers,
+        staging,
+    }
 }
 
 /// A view that draws everything: no haze, no flags, no limit.
 #[must_use]
 pub fn frame(drawn_count: u32) -> Frame {
     Frame {
-        clip_from_view_world: [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]],
+        clip_from_view_world: [
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ],
         viewport: [64.0, 64.0],
         pixels_per_radian: 64.0,
         tolerance: 1.0,
@@ -91,11 +119,23 @@ fn step_of(id: TileId, spacing: f32) -> [f32; 2] {
 fn place_of(id: TileId, spacing: f32, row: f32, column: f32) -> [f32; 2] {
     let step = step_of(id, spacing);
     let cells = TILE_CELLS as f32;
-    [(id.column as f32 * cells + column) * step[0], (id.row as f32 * cells + row) * step[1]]
+    [
+        (id.column as f32 * cells + column) * step[0],
+        (id.row as f32 * cells + row) * step[1],
+    ]
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "a test's ground is some kilometres high")]
-fn units_at(id: TileId, spacing: f32, relief: &dyn Fn(f32, f32) -> f32, row: f32, column: f32) -> i32 {
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a test's ground is some kilometres high"
+)]
+fn units_at(
+    id: TileId,
+    spacing: f32,
+    relief: &dyn Fn(f32, f32) -> f32,
+    row: f32,
+    column: f32,
+) -> i32 {
     let [east, north] = place_of(id, spacing, row, column);
     (relief(east, north) / UNIT).round() as i32
 }
@@ -105,7 +145,13 @@ fn stage_ground(id: TileId, spacing: f32, relief: &dyn Fn(f32, f32) -> f32, word
     let quad = QUAD_SAMPLES as f32;
     for i in 0..CAGE_CONTROLS {
         for j in 0..CAGE_CONTROLS {
-            let height = units_at(id, spacing, relief, (i as f32 - 1.0) * quad, (j as f32 - 1.0) * quad);
+            let height = units_at(
+                id,
+                spacing,
+                relief,
+                (i as f32 - 1.0) * quad,
+                (j as f32 - 1.0) * quad,
+            );
             words[UPLOAD_CONTROLS_WORD + i * CAGE_CONTROLS + j] = height.cast_unsigned();
         }
     }
@@ -113,8 +159,8 @@ fn stage_ground(id: TileId, spacing: f32, relief: &dyn Fn(f32, f32) -> f32, word
     for (first_row, first_column) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
         for row in (first_row..TILE_SAMPLES).step_by(2) {
             for column in (first_column..TILE_SAMPLES).step_by(2) {
-                let residual =
-                    units_at(id, spacing, relief, row as f32, column as f32) - base_height(words, row, column);
+                let residual = units_at(id, spacing, relief, row as f32, column as f32)
+                    - base_height(words, row, column);
                 let code = residual - code_prediction(words, 1, row, column);
                 words[UPLOAD_DETAIL_WORD + row * TILE_SAMPLES + column] = code.cast_unsigned();
             }
@@ -122,7 +168,12 @@ fn stage_ground(id: TileId, spacing: f32, relief: &dyn Fn(f32, f32) -> f32, word
     }
 }
 
-fn drawn_tile(id: TileId, spacing: f32, places: &HashMap<TileId, u32>, slot_of: &dyn Fn(TileId) -> u32) -> DrawnTile {
+fn drawn_tile(
+    id: TileId,
+    spacing: f32,
+    places: &HashMap<TileId, u32>,
+    slot_of: &dyn Fn(TileId) -> u32,
+) -> DrawnTile {
     let [east, north] = place_of(id, spacing, 0.0, 0.0);
     let corners = [0, 1, 2, 3].map(|corner| corner_owner(id, corner, places));
     DrawnTile {
@@ -168,13 +219,20 @@ fn side(id: TileId, toward: [i32; 2], near: [u32; 2], places: &HashMap<TileId, u
     if let Some(&place) = other.parent().and_then(|parent| places.get(&parent)) {
         return [place | SIDE_COARSER << 30; 2];
     }
-    near.map(|quadrant| places.get(&other.child(quadrant)).map_or(NONE, |&place| place | SIDE_FINER << 30))
+    near.map(|quadrant| {
+        places
+            .get(&other.child(quadrant))
+            .map_or(NONE, |&place| place | SIDE_FINER << 30)
+    })
 }
 
 /// The owner of a corner: the coarsest that touches it, of these the first by row and column.
 fn corner_owner(id: TileId, corner: u32, places: &HashMap<TileId, u32>) -> (u32, u32) {
     let (south, east) = (corner / 2, corner % 2);
-    let (down, right) = (if south == 0 { -1 } else { 1 }, if east == 0 { -1 } else { 1 });
+    let (down, right) = (
+        if south == 0 { -1 } else { 1 },
+        if east == 0 { -1 } else { 1 },
+    );
     let touching = [[0, 0], [down, 0], [0, right], [down, right]];
     let around = touching.into_iter().filter_map(|toward| beside(id, toward));
     let owner = around
@@ -185,6 +243,12 @@ fn corner_owner(id: TileId, corner: u32, places: &HashMap<TileId, u32>) -> (u32,
         .unwrap_or(id);
     let up = id.level - owner.level;
     let sample = |at: u32, first: u32| (at * 128 >> up) - first * 128;
-    let (row, column) = (sample(id.row + south, owner.row), sample(id.column + east, owner.column));
-    (places.get(&owner).copied().unwrap_or(NONE), row * 129 + column)
+    let (row, column) = (
+        sample(id.row + south, owner.row),
+        sample(id.column + east, owner.column),
+    );
+    (
+        places.get(&owner).copied().unwrap_or(NONE),
+        row * 129 + column,
+    )
 }
