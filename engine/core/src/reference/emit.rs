@@ -231,6 +231,12 @@ impl Writer<'_> {
     }
 }
 
+/// True where a patch has triangles of a template: split edges, or fours beside a coarser tile.
+fn is_transition(word: u32, shift: u32) -> bool {
+    let is_beside_coarser = word_depth(word, shift) == FINEST_DEPTH && word_coarser(word) != 0;
+    word_split(word, shift) != 0 || is_beside_coarser
+}
+
 /// The first place, clockwise, of a patch's part of a side.
 fn skirt_start(patch: u32, edge: u32) -> u32 {
     let row = patch / TILE_QUADS * QUAD_SAMPLES;
@@ -277,7 +283,7 @@ pub fn write(
                 writer.at, draw_list[CURSOR_WORD] as usize,
                 "counted as written"
             );
-            let is_transition = word_split(word, shift) != 0;
+            let is_transition = is_transition(word, shift);
             let class = word_depth(word, shift) as usize + if is_transition { 3 } else { 0 };
             draw_list[CLASS_COUNTS_WORD + class] += 1;
         }
