@@ -1,7 +1,7 @@
 //! emit: patches become one list of indices and the arguments of its draw.
 //!
 //! Reads frame, tiles, pool (voids) and patches; writes the head of the list (zero before) and indices. Steps in order:
-//! [`count`] (indices at every shift), [`write`] (at the least shift that fits; when none does, nothing is drawn).
+//! [`count`] (indices at every shift), [`write()`] (at the least shift that fits; when none does, nothing is drawn).
 //! Triangles wind counter-clockwise seen from above. Every vertex is that of the tile that owns its sample.
 //! A GPU reserves the list in any order, 64 patches at a time; here they are in order.
 //!
