@@ -5,8 +5,10 @@ use crate::geo::{CAGE_CONTROL_COUNT, PATCH_COUNT, TILE_SAMPLE_COUNT};
 use crate::pyramid::Tile;
 
 /// The most bytes a tile takes in RAM: what is set aside for one that is being read.
-pub const TILE_BYTES: u64 =
-    (size_of::<Tile>() + 4 * (CAGE_CONTROL_COUNT + TILE_SAMPLE_COUNT) + PATCH_COUNT + TILE_SAMPLE_COUNT.div_ceil(8)) as u64;
+pub const TILE_BYTES: u64 = (size_of::<Tile>()
+    + 4 * (CAGE_CONTROL_COUNT + TILE_SAMPLE_COUNT)
+    + PATCH_COUNT
+    + TILE_SAMPLE_COUNT.div_ceil(8)) as u64;
 
 /// How far the pixel target is raised, as a factor of at least 1.
 ///
@@ -23,7 +25,12 @@ pub struct Relaxation {
 
 impl Default for Relaxation {
     fn default() -> Self {
-        Self { factor: 1.0, rest: 0, refused: false, last: None }
+        Self {
+            factor: 1.0,
+            rest: 0,
+            refused: false,
+            last: None,
+        }
     }
 }
 
@@ -41,7 +48,12 @@ impl Relaxation {
 
     /// Once a plan, before the cut: `fill` is the share of the limit the last cut took.
     pub fn begin(&mut self, view: &View, fill: f64) {
-        let still = self.last.is_some_and(|last| View { time: view.time, ..last } == *view);
+        let still = self.last.is_some_and(|last| {
+            View {
+                time: view.time,
+                ..last
+            } == *view
+        });
         self.last = Some(*view);
         self.refused &= still;
         self.rest = self.rest.saturating_sub(1);

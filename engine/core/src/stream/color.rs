@@ -49,7 +49,11 @@ impl ColorLife {
     /// The layer, where there is one.
     #[must_use]
     pub fn layer(&self) -> Option<u32> {
-        if let Self::Uploaded(layer) = self { Some(*layer) } else { None }
+        if let Self::Uploaded(layer) = self {
+            Some(*layer)
+        } else {
+            None
+        }
     }
 }
 
@@ -75,13 +79,28 @@ impl ColorPool {
         let layers = if levels == 0 { 0 } else { layers };
         let free = (0..layers).rev().collect();
         let holders = vec![NO_NODE; layers as usize];
-        Self { free, layers, levels, texel_px, wanted: vec![], ranked: vec![], holders, ready: vec![] }
+        Self {
+            free,
+            layers,
+            levels,
+            texel_px,
+            wanted: vec![],
+            ranked: vec![],
+            holders,
+            ready: vec![],
+        }
     }
 
     /// Layers in all; 0 where there is no imagery.
     #[must_use]
     pub fn layers(&self) -> u32 {
         self.layers
+    }
+
+    /// Levels of imagery.
+    #[must_use]
+    pub fn levels(&self) -> u8 {
+        self.levels
     }
 
     /// Layers in use.
@@ -102,12 +121,17 @@ impl ColorPool {
             if node.id.level >= self.levels || matches!(node.color, ColorLife::Nothing) {
                 continue;
             }
-            let texel_px = if node.parent == NO_NODE { f64::MAX } else { parent_texel_px(tree, node.parent, rule) };
+            let texel_px = if node.parent == NO_NODE {
+                f64::MAX
+            } else {
+                parent_texel_px(tree, node.parent, rule)
+            };
             if texel_px > self.texel_px && (node.visible || node.parent == NO_NODE) {
                 self.ranked.push((texel_px, node.id.level, place));
             }
         }
-        self.ranked.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
+        self.ranked
+            .sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
         self.ranked.truncate(self.layers as usize);
         for &(_, _, place) in &self.ranked {
             tree.node_mut(place).color_wanted = number;
@@ -120,8 +144,15 @@ impl ColorPool {
     /// Pictures that plan `number` wants keep their layers.
     fn take(&mut self, tree: &mut Tree, node: u32, number: u64) -> Option<u32> {
         let layer = self.free.pop().or_else(|| {
-            let idle = |&holder: &u32| holder != NO_NODE && tree.node(holder).color_wanted != number;
-            let age = |&holder: &u32| (tree.node(holder).color_wanted, u8::MAX - tree.node(holder).id.level, holder);
+            let idle =
+                |&holder: &u32| holder != NO_NODE && tree.node(holder).color_wanted != number;
+            let age = |&holder: &u32| {
+                (
+                    tree.node(holder).color_wanted,
+                    u8::MAX - tree.node(holder).id.level,
+                    holder,
+                )
+            };
             let oldest = self.holders.iter().copied().filter(idle).min_by_key(age)?;
             let layer = tree.node(oldest).color.layer()?;
             tree.node_mut(oldest).color = ColorLife::Absent;
@@ -162,12 +193,16 @@ impl ColorPool {
         });
     }
 
-    /// The next picture of plan `number` that was read, and the layer it goes to.
+    /// The most needed picture of plan `number` that was read and has no layer, and the layer it goes to.
     pub fn upload(&mut self, tree: &mut Tree, number: u64) -> Option<(u32, Arc<[u8]>)> {
-        let at = self.ready.iter().position(|&ready| tree.node(ready).color_wanted == number)?;
-        let layer = self.take(tree, self.ready[at], number)?;
-        let node = tree.node_mut(self.ready.remove(at));
-        match std::mem::replace(&mut node.color, ColorLife::Uploaded(layer)) {
+        if self.ready.is_empty() {
+            return None;
+        }
+        let is_ready = |&&place: &&u32| matches!(tree.node(place).color, ColorLife::Ready(_));
+        let place = *self.wanted.iter().find(is_ready)?;
+        let layer = self.take(tree, place, number)?;
+        self.ready.retain(|&ready| ready != place);
+        match std::mem::replace(&mut tree.node_mut(place).color, ColorLife::Uploaded(layer)) {
             ColorLife::Ready(texels) => Some((layer, texels)),
             _ => None,
         }
@@ -183,5 +218,8 @@ impl ColorPool {
 /// How large a texel of a node's picture is on the screen.
 fn parent_texel_px(tree: &Tree, node: u32, rule: &CutRule) -> f64 {
     let node = tree.node(node);
-    rule.texel_px(&node.bounds, TILE_CELLS as f64 * tree.corner_and_step(node.id).1[0])
+    rule.texel_px(
+        &node.bounds,
+        TILE_CELLS as f64 * tree.corner_and_step(node.id).1[0],
+    )
 }

@@ -17,6 +17,8 @@ pub struct CutRule {
     eye: [f64; 3],
     frustum: Frustum,
     pixels_per_radian: f64,
+    /// Nothing is drawn nearer than the near plane, so nothing counts as nearer: gains stay finite.
+    nearest: f64,
     /// Largest screen-space error, pixels.
     pub tolerance: f64,
     /// The tolerance outside the view, as a factor.
@@ -30,13 +32,21 @@ impl CutRule {
     #[must_use]
     pub fn new(view: &View, tolerance: f64, outside: f64, imagery: Option<(u8, f64)>) -> Self {
         let (frustum, pixels_per_radian) = (view.frustum(), view.pixels_per_radian());
-        Self { eye: view.eye, frustum, pixels_per_radian, tolerance, outside, imagery }
+        Self {
+            eye: view.eye,
+            frustum,
+            pixels_per_radian,
+            nearest: view.near,
+            tolerance,
+            outside,
+            imagery,
+        }
     }
 
     /// Pixels of a texel of a picture that is `width` metres wide and lies in the box.
     #[must_use]
     pub fn texel_px(&self, bounds: &Bounds, width: f64) -> f64 {
-        width / 255.0 * self.pixels_per_radian / bounds.distance(self.eye)
+        width / 255.0 * self.pixels_per_radian / bounds.distance(self.eye).max(self.nearest)
     }
 
     /// Sets a node's `visible`, `gain` and `split`, once a run.
@@ -46,16 +56,20 @@ impl CutRule {
         }
         node.mark = run;
         let visible = self.frustum.sees(&node.bounds);
-        let allowed = if visible { self.tolerance } else { self.tolerance * self.outside };
-        let distance = node.bounds.distance(self.eye);
-        let error_px = f64::from(node.summary.error) * self.pixels_per_radian / distance;
-        let mut gain = if distance == 0.0 { f64::MAX } else { error_px / allowed };
+        let allowed = if visible {
+            self.tolerance
+        } else {
+            self.tolerance * self.outside
+        };
+        let distance = node.bounds.distance(self.eye).max(self.nearest);
+        let error = f64::from(node.summary.error).min(1e9);
+        let mut gain = error * self.pixels_per_radian / distance / allowed;
         if let Some((levels, texel_px)) = self.imagery
             && node.id.level + 1 < levels
             && visible
         {
             let width = node.bounds.max[0] - node.bounds.min[0];
-            gain = gain.max(self.texel_px(&node.bounds, width) / (texel_px * self.tolerance.max(1.0)));
+            gain = gain.max(self.texel_px(&node.bounds, width) / texel_px);
         }
         node.visible = visible;
         node.split = node.id.level < finest && gain > 1.0;
@@ -64,7 +78,10 @@ impl CutRule {
 }
 
 /// Gain as a rank: whatever is visible comes before all that is not.
-#[expect(clippy::cast_possible_truncation, reason = "a rank: clamped, and rounding is harmless")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a rank: clamped, and rounding is harmless"
+)]
 fn rank(gain: f64, visible: bool) -> f32 {
     let gain = gain.clamp(0.0, 1e9) as f32;
     if visible { gain * 1e12 } else { gain }
@@ -95,7 +112,8 @@ impl Wanted {
     /// Finds the cut among the known tiles; false when it is beyond the limit (the list is then of no use).
     pub fn find(&mut self, tree: &mut Tree, rule: &CutRule, limit: CutLimit) -> bool {
         self.run = tree.begin_run();
-        self.by_level.resize_with(usize::from(tree.finest()) + 1, Vec::new);
+        self.by_level
+            .resize_with(usize::from(tree.finest()) + 1, Vec::new);
         self.by_level.iter_mut().for_each(Vec::clear);
         self.split(tree, rule, limit) && {
             self.balance(tree, rule);
@@ -115,7 +133,8 @@ impl Wanted {
             rule.judge(node, finest, self.run);
             if node.split {
                 let first = self.stack.len();
-                self.stack.extend(node.children.iter().filter(|&&child| child != NO_NODE));
+                self.stack
+                    .extend(node.children.iter().filter(|&&child| child != NO_NODE));
                 self.by_level[usize::from(node.id.level)].push(place);
                 count += self.stack.len() - first;
                 if count > limit.nodes {
@@ -169,7 +188,8 @@ impl Wanted {
             let node = tree.node(place);
             let before = self.nodes.len();
             if node.mark == self.run && node.split {
-                self.nodes.extend(node.children.iter().filter(|&&child| child != NO_NODE));
+                self.nodes
+                    .extend(node.children.iter().filter(|&&child| child != NO_NODE));
             }
             self.leaf_count += usize::from(self.nodes.len() == before);
             at += 1;
@@ -179,12 +199,27 @@ impl Wanted {
 
 /// The up to four tiles of the coarser level around a tile: its parent, and those of its neighbours.
 fn parents_around(tree: &Tree, id: TileId) -> impl Iterator<Item = TileId> + use<> {
-    let [rows, columns] = id.level.checked_sub(1).map_or([0, 0], |level| tree.grid().tiles(level));
-    let near = |at: u32| [Some(at / 2), if at % 2 == 0 { (at / 2).checked_sub(1) } else { Some(at / 2 + 1) }];
+    let [rows, columns] = id
+        .level
+        .checked_sub(1)
+        .map_or([0, 0], |level| tree.grid().tiles(level));
+    let near = |at: u32| {
+        [
+            Some(at / 2),
+            if at % 2 == 0 {
+                (at / 2).checked_sub(1)
+            } else {
+                Some(at / 2 + 1)
+            },
+        ]
+    };
     let rows = near(id.row).map(|row| row.filter(|&row| row < rows));
     let columns = near(id.column).map(|column| column.filter(|&column| column < columns));
     rows.into_iter().flatten().flat_map(move |row| {
-        columns.into_iter().flatten().map(move |column| TileId::new(id.level.saturating_sub(1), row, column))
+        columns
+            .into_iter()
+            .flatten()
+            .map(move |column| TileId::new(id.level.saturating_sub(1), row, column))
     })
 }
 
@@ -193,7 +228,10 @@ mod tests {
     use super::*;
     use crate::stream::synthetic::Synthetic;
 
-    const NO_LIMIT: CutLimit = CutLimit { nodes: usize::MAX, leaves: usize::MAX };
+    const NO_LIMIT: CutLimit = CutLimit {
+        nodes: usize::MAX,
+        leaves: usize::MAX,
+    };
 
     fn wanted(tree: &mut Tree, view: &View, limit: CutLimit) -> (Wanted, bool) {
         let rule = CutRule::new(view, 1.0, 4.0, None);
@@ -205,13 +243,18 @@ mod tests {
     #[test]
     fn what_is_not_split_is_within_the_tolerance() {
         let mut tree = Synthetic::new(4000, 3000, 5).whole_tree();
-        let view = View::looking_at([300.0, -2000.0, 900.0], [0.0; 3], 1.0, [1280, 720]);
+        let view = View::looking_at([300.0, -700.0, 200.0], [0.0; 3], 1.0, [1280, 720]);
         let (wanted, fits) = wanted(&mut tree, &view, NO_LIMIT);
         assert!(fits && wanted.leaf_count > 20);
         for &place in &wanted.nodes {
             let node = tree.node(place);
-            let error_px = f64::from(node.summary.error) * view.pixels_per_radian() / node.bounds.distance(view.eye);
-            assert!(node.split || node.id.level == tree.finest() || error_px <= if node.visible { 1.0 } else { 4.0 });
+            let error_px = f64::from(node.summary.error) * view.pixels_per_radian()
+                / node.bounds.distance(view.eye);
+            assert!(
+                node.split
+                    || node.id.level == tree.finest()
+                    || error_px <= if node.visible { 1.0 } else { 4.0 }
+            );
         }
     }
 
@@ -220,10 +263,15 @@ mod tests {
         let mut tree = Synthetic::new(4000, 3000, 6).whole_tree();
         let view = View::looking_at([10.0, 20.0, 5.0], [1000.0, 500.0, 0.0], 0.8, [640, 480]);
         let (wanted, _) = wanted(&mut tree, &view, NO_LIMIT);
-        let split: Vec<_> = wanted.nodes.iter().filter(|&&node| tree.node(node).split).collect();
+        let split: Vec<_> = wanted
+            .nodes
+            .iter()
+            .filter(|&&node| tree.node(node).split)
+            .collect();
         assert!(split.len() > 10);
         for &&place in &split {
-            for parent in parents_around(&tree, tree.node(place).id).filter(|_| place != Tree::ROOT) {
+            for parent in parents_around(&tree, tree.node(place).id).filter(|_| place != Tree::ROOT)
+            {
                 let parent = tree.find(parent).unwrap();
                 assert!(tree.node(parent).split && wanted.nodes.contains(&parent));
             }
@@ -234,7 +282,27 @@ mod tests {
     fn a_cut_beyond_the_limit_is_refused() {
         let mut tree = Synthetic::new(4000, 3000, 6).whole_tree();
         let view = View::looking_at([10.0, 20.0, 5.0], [1000.0, 500.0, 0.0], 0.8, [640, 480]);
-        assert!(!wanted(&mut tree, &view, CutLimit { nodes: 20, leaves: usize::MAX }).1);
-        assert!(!wanted(&mut tree, &view, CutLimit { nodes: usize::MAX, leaves: 10 }).1);
+        assert!(
+            !wanted(
+                &mut tree,
+                &view,
+                CutLimit {
+                    nodes: 20,
+                    leaves: usize::MAX
+                }
+            )
+            .1
+        );
+        assert!(
+            !wanted(
+                &mut tree,
+                &view,
+                CutLimit {
+                    nodes: usize::MAX,
+                    leaves: 10
+                }
+            )
+            .1
+        );
     }
 }

@@ -70,7 +70,11 @@ impl Loader {
     /// # Errors
     ///
     /// When the system gives no thread.
-    pub fn new(source: &Arc<dyn TileSource>, threads: usize, in_flight: u32) -> Result<Self, PyramidError> {
+    pub fn new(
+        source: &Arc<dyn TileSource>,
+        threads: usize,
+        in_flight: u32,
+    ) -> Result<Self, PyramidError> {
         let (requests, inbox) = bounded(in_flight as usize);
         let (outbox, answers) = bounded(in_flight as usize);
         let generations: Arc<[AtomicU64]> = (0..in_flight).map(|_| AtomicU64::new(0)).collect();
@@ -86,7 +90,9 @@ impl Loader {
             let (inbox, outbox) = (Receiver::clone(&inbox), Sender::clone(&outbox));
             let thread = std::thread::Builder::new().name(format!("drumlin-loader-{index}"));
             let thread = thread.spawn(move || serve(&*source, &generations, &inbox, &outbox));
-            let thread = thread.map_err(|error| PyramidError::Refused(format!("starting a loader thread: {error}")))?;
+            let thread = thread.map_err(|error| {
+                PyramidError::Refused(format!("starting a loader thread: {error}"))
+            })?;
             loader.threads.push(thread);
         }
         Ok(loader)
@@ -108,7 +114,14 @@ impl Loader {
     pub fn request(&mut self, id: TileId, job: Job) -> Option<Ticket> {
         let ticket = self.free.pop()?;
         let generation = self.generations[ticket as usize].load(Ordering::Relaxed);
-        let sent = self.requests.as_ref().map(|requests| requests.try_send(Request { ticket, generation, id, job }));
+        let sent = self.requests.as_ref().map(|requests| {
+            requests.try_send(Request {
+                ticket,
+                generation,
+                id,
+                job,
+            })
+        });
         if matches!(sent, Some(Ok(()))) {
             return Some(ticket);
         }
@@ -123,7 +136,11 @@ impl Loader {
 
     /// The next answer, waiting for it at most so long.
     pub fn answer(&mut self, wait: Duration) -> Option<(Ticket, Loaded)> {
-        let answer = if wait.is_zero() { self.answers.try_recv().ok() } else { self.answers.recv_timeout(wait).ok() };
+        let answer = if wait.is_zero() {
+            self.answers.try_recv().ok()
+        } else {
+            self.answers.recv_timeout(wait).ok()
+        };
         if let Some((ticket, _)) = answer {
             self.free.push(ticket);
         }
@@ -155,7 +172,10 @@ fn serve(
         let loaded = if current == request.generation {
             // A panic is a bug of the source; it costs a tile and not the flight.
             catch_unwind(AssertUnwindSafe(|| read(source, &request))).unwrap_or_else(|_| {
-                Loaded::Failed(PyramidError::Tile { tile: request.id, what: "reading it panicked".into() })
+                Loaded::Failed(PyramidError::Tile {
+                    tile: request.id,
+                    what: "reading it panicked".into(),
+                })
             })
         } else {
             Loaded::Cancelled
@@ -168,9 +188,9 @@ fn serve(
 
 fn read(source: &dyn TileSource, request: &Request) -> Loaded {
     let loaded = match &request.job {
-        Job::Tile(parent) => {
-            source.load(request.id, parent.as_deref()).map(|tile| Loaded::Tile(Arc::new(tile)))
-        }
+        Job::Tile(parent) => source
+            .load(request.id, parent.as_deref())
+            .map(|tile| Loaded::Tile(Arc::new(tile))),
         Job::Color => source.load_color(request.id).map(Loaded::Color),
     };
     loaded.unwrap_or_else(Loaded::Failed)
@@ -190,7 +210,9 @@ mod tests {
     #[test]
     fn no_more_is_under_way_than_allowed() {
         let mut loader = Loader::new(&source(5), 2, 3).unwrap();
-        let tickets: Vec<_> = (0..5).map(|_| loader.request(TileId::ROOT, Job::Color)).collect();
+        let tickets: Vec<_> = (0..5)
+            .map(|_| loader.request(TileId::ROOT, Job::Color))
+            .collect();
         assert_eq!(tickets.iter().flatten().count(), 3);
         assert_eq!(loader.in_flight(), 3);
         for _ in 0..3 {
@@ -202,10 +224,20 @@ mod tests {
     #[test]
     fn a_cancelled_request_is_not_read() {
         let mut loader = Loader::new(&source(20), 1, 4).unwrap();
-        let tickets: Vec<_> = (0..4).filter_map(|_| loader.request(TileId::ROOT, Job::Color)).collect();
-        tickets[1..].iter().for_each(|&ticket| loader.cancel(ticket));
-        let answers: Vec<_> = (0..4).filter_map(|_| loader.answer(Duration::from_secs(60))).collect();
+        let tickets: Vec<_> = (0..4)
+            .filter_map(|_| loader.request(TileId::ROOT, Job::Color))
+            .collect();
+        tickets[1..]
+            .iter()
+            .for_each(|&ticket| loader.cancel(ticket));
+        let answers: Vec<_> = (0..4)
+            .filter_map(|_| loader.answer(Duration::from_secs(60)))
+            .collect();
         assert!(matches!(answers[0].1, Loaded::Color(Some(_))));
-        assert!(answers[2..].iter().all(|(_, loaded)| matches!(loaded, Loaded::Cancelled)));
+        assert!(
+            answers[2..]
+                .iter()
+                .all(|(_, loaded)| matches!(loaded, Loaded::Cancelled))
+        );
     }
 }

@@ -34,6 +34,8 @@ pub use motion::Motion;
 pub use neighbours::{Neighbours, Side, neighbours};
 pub(crate) use residency::Residency;
 pub use residency::SlotPool;
+#[cfg(test)]
+pub(crate) use schedule::mix;
 pub(crate) use schedule::{PATIENCE, Requester};
 pub use schedule::{Retry, Scheduler};
 pub use source::TileSource;

@@ -22,7 +22,9 @@ impl Motion {
 
     /// Takes note of a view.
     pub fn observe(&mut self, view: &View) {
-        let Some(last) = self.last.replace(*view) else { return };
+        let Some(last) = self.last.replace(*view) else {
+            return;
+        };
         let elapsed = view.time - last.time;
         if !(elapsed > 0.0 && elapsed < Self::LONGEST) {
             (self.velocity, self.turn) = (DVec3::ZERO, DVec3::ZERO);

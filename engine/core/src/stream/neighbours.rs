@@ -35,7 +35,8 @@ pub fn neighbours(tree: &Tree, leaf: &Leaf) -> Neighbours {
     let corners = [0, 1, 2, 3].map(|corner| corner_owner(tree, leaf, corner));
     Neighbours {
         // Places around the tile, and the children of a neighbour there that touch it.
-        sides: [(1, [2, 3]), (5, [0, 2]), (7, [0, 1]), (3, [1, 3])].map(|(at, near)| side(tree, leaf, at, near)),
+        sides: [(1, [2, 3]), (5, [0, 2]), (7, [0, 1]), (3, [1, 3])]
+            .map(|(at, near)| side(tree, leaf, at, near)),
         corner_tile: corners.map(|(tile, _)| tile),
         corner_sample: corners.map(|(_, sample)| sample),
     }
@@ -63,15 +64,21 @@ fn corner_owner(tree: &Tree, leaf: &Leaf, corner: usize) -> (u32, u32) {
     let id = tree.node(leaf.node).id;
     let (south, east) = (corner / 2, corner % 2);
     let places = [4, south * 6 + 1, 3 + east * 2, south * 6 + east * 2];
-    let touching = places.map(|at| leaf.around[at]).into_iter().filter(|&near| near != NO_NODE);
-    let coarse = touching.map(|near| tree.node(near)).filter(|near| !near.drawn_split);
+    let touching = places
+        .map(|at| leaf.around[at])
+        .into_iter()
+        .filter(|&near| near != NO_NODE);
+    let coarse = touching
+        .map(|near| tree.node(near))
+        .filter(|near| !near.drawn_split);
     // The tile itself is among them.
     let Some(owner) = coarse.min_by_key(|near| (near.id.level, near.id.row, near.id.column)) else {
         return (tree.node(leaf.node).drawn, 0);
     };
     let cells = TILE_CELLS as u32;
     let up = id.level - owner.id.level;
-    let sample = |at: u32, step: usize, first: u32| ((at + step as u32) * cells >> up) - first * cells;
+    let sample =
+        |at: u32, step: usize, first: u32| ((at + step as u32) * cells >> up) - first * cells;
     let row = sample(id.row, south, owner.id.row);
     let column = sample(id.column, east, owner.id.column);
     (owner.drawn, row * (cells + 1) + column)
@@ -92,8 +99,16 @@ mod tests {
             let tile = std::sync::Arc::new(source.tile(tree.node(place).id));
             tree.node_mut(place).life = Life::Uploaded { tile, slot: place };
         }
-        let view = View::looking_at([-300.0, 200.0, 80.0], [-280.0, 200.0, 50.0], 0.9, [600, 400]);
-        let limit = CutLimit { nodes: usize::MAX, leaves: usize::MAX };
+        let view = View::looking_at(
+            [-300.0, 200.0, 80.0],
+            [-280.0, 200.0, 50.0],
+            0.9,
+            [600, 400],
+        );
+        let limit = CutLimit {
+            nodes: usize::MAX,
+            leaves: usize::MAX,
+        };
         assert!(Wanted::default().find(&mut tree, &CutRule::new(&view, 1.0, 4.0, None), limit));
         let mut drawn = Drawn::default();
         drawn.find(&mut tree);
@@ -103,7 +118,11 @@ mod tests {
     #[test]
     fn relations_are_mutual() {
         let (tree, drawn) = drawn();
-        let all: Vec<_> = drawn.leaves.iter().map(|leaf| neighbours(&tree, leaf)).collect();
+        let all: Vec<_> = drawn
+            .leaves
+            .iter()
+            .map(|leaf| neighbours(&tree, leaf))
+            .collect();
         let mut seen = [false; 4];
         for (index, around) in (0u32..).zip(&all) {
             for (side, halves) in around.sides.iter().enumerate() {
@@ -137,7 +156,11 @@ mod tests {
         let finest = tree.finest();
         let place = |tile: TileId, sample: u32| {
             let up = finest - tile.level;
-            [tile.row * 128 + sample / 129, tile.column * 128 + sample % 129].map(|at| at << up)
+            [
+                tile.row * 128 + sample / 129,
+                tile.column * 128 + sample % 129,
+            ]
+            .map(|at| at << up)
         };
         let mut owners = std::collections::HashMap::new();
         for (index, leaf) in (0u32..).zip(&drawn.leaves) {
@@ -146,7 +169,9 @@ mod tests {
                 let (owner, owned) = (around.corner_tile[corner], around.corner_sample[corner]);
                 assert_eq!(place(id(index), sample), place(id(owner), owned));
                 assert!(id(owner).level <= id(index).level);
-                let before = owners.entry(place(id(index), sample)).or_insert((owner, owned));
+                let before = owners
+                    .entry(place(id(index), sample))
+                    .or_insert((owner, owned));
                 assert_eq!(*before, (owner, owned));
             }
         }

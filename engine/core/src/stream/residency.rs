@@ -16,7 +16,10 @@ impl SlotPool {
     /// A pool of empty slots.
     #[must_use]
     pub fn new(capacity: u32) -> Self {
-        Self { free: (0..capacity).rev().collect(), capacity }
+        Self {
+            free: (0..capacity).rev().collect(),
+            capacity,
+        }
     }
 
     /// Slots in all.
@@ -47,7 +50,13 @@ pub(crate) struct Residency {
 impl Residency {
     pub(crate) fn new(slots: u32, ram_budget: u64) -> Self {
         let slots = SlotPool::new(slots);
-        Self { slots, ram_bytes: 0, ram_budget, ram_victims: None, slot_victims: None }
+        Self {
+            slots,
+            ram_bytes: 0,
+            ram_budget,
+            ram_victims: None,
+            slot_victims: None,
+        }
     }
 
     /// Stamps have changed: look for victims anew.
@@ -57,9 +66,18 @@ impl Residency {
 
     /// Makes room for `bytes` beside what is there; false when all that is there is wanted, or was looked at in plan
     /// `since` or later.
-    pub(crate) fn make_room(&mut self, tree: &mut Tree, colors: &mut ColorPool, bytes: u64, plan: u64, since: u64) -> bool {
+    pub(crate) fn make_room(
+        &mut self,
+        tree: &mut Tree,
+        colors: &mut ColorPool,
+        bytes: u64,
+        plan: u64,
+        since: u64,
+    ) -> bool {
         while self.ram_bytes + bytes > self.ram_budget {
-            let victims = self.ram_victims.get_or_insert_with(|| victims(tree, plan, |_| true));
+            let victims = self
+                .ram_victims
+                .get_or_insert_with(|| victims(tree, plan, |_| true));
             match victims.last() {
                 Some(&victim) if tree.node(victim).used < since => victims.pop(),
                 _ => return false,
@@ -71,9 +89,20 @@ impl Residency {
     }
 
     fn evict(&mut self, tree: &mut Tree, colors: &mut ColorPool, victim: u32) {
-        let Some(bytes) = tree.node(victim).tile().map(|tile| tile.byte_count() as u64) else { return };
+        let Some(bytes) = tree
+            .node(victim)
+            .tile()
+            .map(|tile| tile.byte_count() as u64)
+        else {
+            return;
+        };
         let slot = tree.node(victim).slot();
-        for child in tree.node(victim).children.into_iter().filter(|&child| child != NO_NODE) {
+        for child in tree
+            .node(victim)
+            .children
+            .into_iter()
+            .filter(|&child| child != NO_NODE)
+        {
             if tree.node(child).tile().is_none() {
                 colors.release(tree, child);
             }
@@ -91,7 +120,9 @@ impl Residency {
         if let Some(slot) = self.slots.free.pop() {
             return Some(slot);
         }
-        let victims = self.slot_victims.get_or_insert_with(|| victims(tree, plan, |life| matches!(life, Life::Uploaded { .. })));
+        let victims = self.slot_victims.get_or_insert_with(|| {
+            victims(tree, plan, |life| matches!(life, Life::Uploaded { .. }))
+        });
         while let Some(victim) = victims.pop() {
             let node = tree.node_mut(victim);
             if let Life::Uploaded { tile, slot } = &node.life {
@@ -107,7 +138,11 @@ impl Residency {
 fn victims(tree: &Tree, plan: u64, is_in: impl Fn(&Life) -> bool) -> Vec<u32> {
     let idle = |&place: &u32| {
         let node = tree.node(place);
-        place != Tree::ROOT && node.wanted != plan && node.tile().is_some() && is_in(&node.life) && tree.is_live(place)
+        place != Tree::ROOT
+            && node.wanted != plan
+            && node.tile().is_some()
+            && is_in(&node.life)
+            && tree.is_live(place)
     };
     let mut victims: Vec<_> = (0..tree.places()).filter(idle).collect();
     victims.sort_unstable_by_key(|&place| {

@@ -7,8 +7,8 @@
 use std::{sync::Arc, time::Duration};
 
 use super::{
-    COLOR_BYTES, ColorLife, ColorPool, Job, Life, Loaded, Loader, NO_NODE, TILE_BYTES, Ticket, Tree, Wanted,
-    residency::Residency,
+    COLOR_BYTES, ColorLife, ColorPool, Job, Life, Loaded, Loader, NO_NODE, TILE_BYTES, Ticket,
+    Tree, Wanted, residency::Residency,
 };
 use crate::geo::TileId;
 
@@ -26,7 +26,8 @@ impl Retry {
     /// tried together.
     #[must_use]
     pub fn at(&self, now: u64, attempts: u32, id: TileId) -> u64 {
-        let wait = (self.first_millis << attempts.saturating_sub(1).min(20)).min(self.longest_millis);
+        let wait =
+            (self.first_millis << attempts.saturating_sub(1).min(20)).min(self.longest_millis);
         let address = u64::from(id.level) << 56 ^ u64::from(id.row) << 28 ^ u64::from(id.column);
         now + wait + mix(address ^ u64::from(attempts) << 50) % (wait / 4 + 1)
     }
@@ -59,6 +60,7 @@ pub struct Scheduler {
     /// What went wrong since somebody looked; the last few.
     errors: Vec<String>,
     failures: u64,
+    behind: bool,
 }
 
 /// Tries after which a plan that waits for its tiles goes on without one.
@@ -81,6 +83,7 @@ impl Scheduler {
             queue: Vec::new(),
             errors: Vec::new(),
             failures: 0,
+            behind: false,
         }
     }
 
@@ -88,6 +91,18 @@ impl Scheduler {
     #[must_use]
     pub fn in_flight(&self) -> usize {
         self.loader.in_flight()
+    }
+
+    /// True when the last plan could not ask for all it lacks.
+    #[must_use]
+    pub fn is_behind(&self) -> bool {
+        self.behind
+    }
+
+    /// True when one more picture may be asked for.
+    #[must_use]
+    pub fn has_color_room(&self, colors: &ColorPool) -> bool {
+        self.colors_in_flight + colors.ready() < self.color_limit
     }
 
     /// Reads that failed so far.
@@ -117,14 +132,20 @@ impl Scheduler {
         now: u64,
         wait: Duration,
     ) -> bool {
-        let Some((ticket, loaded)) = self.loader.answer(wait) else { return false };
-        let Some(flight) = self.flights[ticket as usize].take() else { return true };
+        let Some((ticket, loaded)) = self.loader.answer(wait) else {
+            return false;
+        };
+        let Some(flight) = self.flights[ticket as usize].take() else {
+            return true;
+        };
         if flight.is_color {
             self.colors_in_flight -= 1;
         } else {
             self.tiles_in_flight -= 1;
         }
-        let Some(place) = tree.find(flight.id) else { return true };
+        let Some(place) = tree.find(flight.id) else {
+            return true;
+        };
         match loaded {
             Loaded::Tile(tile) if tile.id == flight.id => {
                 if tree.node(place).tile().is_none() {
@@ -134,7 +155,13 @@ impl Scheduler {
             }
             Loaded::Color(texels) => self.color_came(tree, colors, place, ticket, texels),
             Loaded::Failed(error) => self.failed(tree, place, ticket, error.to_string(), now),
-            Loaded::Tile(tile) => self.failed(tree, place, ticket, format!("{}: read as {}", flight.id, tile.id), now),
+            Loaded::Tile(tile) => self.failed(
+                tree,
+                place,
+                ticket,
+                format!("{}: read as {}", flight.id, tile.id),
+                now,
+            ),
             Loaded::Cancelled => {}
         }
         true
@@ -148,28 +175,43 @@ impl Scheduler {
         ticket: Ticket,
         texels: Option<Arc<[u8]>>,
     ) {
-        if !matches!(tree.node(place).color, ColorLife::Requested { ticket: asked, .. } if asked == ticket) {
+        if !matches!(tree.node(place).color, ColorLife::Requested { ticket: asked, .. } if asked == ticket)
+        {
             return;
         }
         match texels {
-            Some(texels) if texels.len() as u64 == COLOR_BYTES => colors.arrive(tree, place, texels),
+            Some(texels) if texels.len() as u64 == COLOR_BYTES => {
+                colors.arrive(tree, place, texels)
+            }
             _ => tree.node_mut(place).color = ColorLife::Nothing,
         }
     }
 
     fn failed(&mut self, tree: &mut Tree, place: u32, ticket: Ticket, error: String, now: u64) {
         let node = tree.node_mut(place);
-        if let Life::Requested { ticket: asked, attempts } = node.life
+        if let Life::Requested {
+            ticket: asked,
+            attempts,
+        } = node.life
             && asked == ticket
         {
             let attempts = attempts + 1;
-            node.life = Life::Failed { attempts, retry_at: self.retry.at(now, attempts, node.id) };
+            node.life = Life::Failed {
+                attempts,
+                retry_at: self.retry.at(now, attempts, node.id),
+            };
         }
-        if let ColorLife::Requested { ticket: asked, attempts } = node.color
+        if let ColorLife::Requested {
+            ticket: asked,
+            attempts,
+        } = node.color
             && asked == ticket
         {
             let attempts = attempts + 1;
-            node.color = ColorLife::Failed { attempts, retry_at: self.retry.at(now, attempts, node.id) };
+            node.color = ColorLife::Failed {
+                attempts,
+                retry_at: self.retry.at(now, attempts, node.id),
+            };
         }
         self.failures += 1;
         if self.errors.len() < Self::ERRORS && !self.errors.contains(&error) {
@@ -180,15 +222,42 @@ impl Scheduler {
     /// Cancels what neither plan `plan` nor the one before looked at.
     pub(crate) fn cancel_stale(&mut self, tree: &mut Tree, plan: u64) {
         for (ticket, flight) in (0..).zip(&self.flights) {
-            let Some(place) = flight.and_then(|flight| tree.find(flight.id)) else { continue };
+            let Some(place) = flight.and_then(|flight| tree.find(flight.id)) else {
+                continue;
+            };
             let node = tree.node_mut(place);
             match (node.life.clone(), &node.color) {
-                (Life::Requested { ticket: asked, attempts }, _) if asked == ticket && node.used + 1 < plan => {
-                    node.life = if attempts > 0 { Life::Failed { attempts, retry_at: 0 } } else { Life::Absent };
+                (
+                    Life::Requested {
+                        ticket: asked,
+                        attempts,
+                    },
+                    _,
+                ) if asked == ticket && node.used + 1 < plan => {
+                    node.life = if attempts > 0 {
+                        Life::Failed {
+                            attempts,
+                            retry_at: 0,
+                        }
+                    } else {
+                        Life::Absent
+                    };
                 }
-                (_, &ColorLife::Requested { ticket: asked, attempts }) if asked == ticket && node.color_wanted + 1 < plan => {
-                    node.color =
-                        if attempts > 0 { ColorLife::Failed { attempts, retry_at: 0 } } else { ColorLife::Absent };
+                (
+                    _,
+                    &ColorLife::Requested {
+                        ticket: asked,
+                        attempts,
+                    },
+                ) if asked == ticket && node.color_wanted + 1 < plan => {
+                    node.color = if attempts > 0 {
+                        ColorLife::Failed {
+                            attempts,
+                            retry_at: 0,
+                        }
+                    } else {
+                        ColorLife::Absent
+                    };
                 }
                 _ => continue,
             }
@@ -196,8 +265,7 @@ impl Scheduler {
         }
     }
 
-    /// Asks for the wanted tiles that are not there, most urgent first, as far as there is room; returns how many
-    /// could be asked for, so that 0 means that all is there or under way.
+    /// Asks for the wanted tiles that are not there, most urgent first, as far as there is room.
     pub(crate) fn request_tiles(
         &mut self,
         tree: &mut Tree,
@@ -206,30 +274,43 @@ impl Scheduler {
         colors: &mut ColorPool,
         now: u64,
         plan: Requester,
-    ) -> usize {
+    ) {
         self.queue.clear();
         for &place in &wanted.nodes {
             let node = tree.node(place);
             if node.parent != NO_NODE && is_due(&node.life, now) {
-                self.queue.push((tree.node(node.parent).gain, node.id, place));
+                self.queue
+                    .push((tree.node(node.parent).gain, node.id, place));
             }
         }
-        self.queue.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let limit = self.flights.len() - if colors.layers() > 0 { self.flights.len() / 4 } else { 0 };
+        self.queue
+            .sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         let queue = std::mem::take(&mut self.queue);
+        let mut asked = 0;
         for &(_, id, place) in &queue {
             let bytes = self.reserved_bytes(colors) + TILE_BYTES;
-            if self.tiles_in_flight >= limit || !room.make_room(tree, colors, bytes, plan.number, plan.since) {
+            if self.tiles_in_flight >= plan.in_flight
+                || !room.make_room(tree, colors, bytes, plan.number, plan.since)
+            {
                 break;
             }
-            let Some(parent) = tree.node(tree.node(place).parent).tile().cloned() else { continue };
-            let Some(ticket) = self.fly(id, Job::Tile(Some(parent))) else { break };
+            let Some(parent) = tree.node(tree.node(place).parent).tile().cloned() else {
+                continue;
+            };
+            let Some(ticket) = self.fly(id, Job::Tile(Some(parent))) else {
+                break;
+            };
             let node = tree.node_mut(place);
-            let attempts = if let Life::Failed { attempts, .. } = node.life { attempts } else { 0 };
+            let attempts = if let Life::Failed { attempts, .. } = node.life {
+                attempts
+            } else {
+                0
+            };
             node.life = Life::Requested { ticket, attempts };
+            asked += 1;
         }
+        self.behind = asked < queue.len();
         self.queue = queue;
-        self.queue.len()
     }
 
     /// Asks for the wanted pictures that are not there.
@@ -252,12 +333,14 @@ impl Scheduler {
             if !due {
                 continue;
             }
-            if self.colors_in_flight + colors.ready() >= self.color_limit
+            if !self.has_color_room(colors)
                 || !room.make_room(tree, colors, bytes, plan.number, plan.since)
             {
                 break;
             }
-            let Some(ticket) = self.fly(tree.node(place).id, Job::Color) else { break };
+            let Some(ticket) = self.fly(tree.node(place).id, Job::Color) else {
+                break;
+            };
             tree.node_mut(place).color = ColorLife::Requested { ticket, attempts };
         }
         colors.wanted = wanted;
@@ -283,6 +366,8 @@ pub(crate) struct Requester {
     pub(crate) number: u64,
     /// What was looked at in this plan or later stays too.
     pub(crate) since: u64,
+    /// Tiles that may be under way.
+    pub(crate) in_flight: usize,
 }
 
 fn is_due(life: &Life, now: u64) -> bool {
@@ -299,13 +384,18 @@ mod tests {
 
     #[test]
     fn waits_double_up_to_the_longest_and_differ_by_tile() {
-        let retry = Retry { first_millis: 100, longest_millis: 2000 };
+        let retry = Retry {
+            first_millis: 100,
+            longest_millis: 2000,
+        };
         let id = TileId::new(3, 1, 2);
         for (attempts, wait) in [(1, 100), (2, 200), (3, 400), (10, 2000), (60, 2000)] {
             let at = retry.at(5000, attempts, id);
             assert!((5000 + wait..=5000 + wait + wait / 4).contains(&at));
         }
-        let times: std::collections::HashSet<_> = (0..50).map(|row| retry.at(0, 3, TileId::new(6, row, 0))).collect();
+        let times: std::collections::HashSet<_> = (0..50)
+            .map(|row| retry.at(0, 3, TileId::new(6, row, 0)))
+            .collect();
         assert!(times.len() > 20);
     }
 }

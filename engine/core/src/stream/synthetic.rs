@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-use super::{Tree, TileSource};
+use super::{TileSource, Tree};
 use crate::{
     geo::{CAGE_CONTROL_COUNT, Crs, Grid, PATCH_COUNT, TILE_SAMPLE_COUNT, TileId},
     pyramid::{ColorMetadata, Level, Metadata, PyramidError, Summary, Tile, VerticalReference},
@@ -28,7 +28,12 @@ pub(crate) struct Synthetic {
 
 impl Synthetic {
     pub(crate) fn new(columns: u32, rows: u32, seed: u64) -> Self {
-        let grid = Grid { columns, rows, origin: [0.0, 0.0], step: [1.0, -1.0] };
+        let grid = Grid {
+            columns,
+            rows,
+            origin: [0.0, 0.0],
+            step: [1.0, -1.0],
+        };
         let level = |level| Level {
             tiles: grid.tiles(level),
             step: 1,
@@ -49,11 +54,21 @@ impl Synthetic {
             color: None,
             sources: Vec::new(),
         };
-        Self { metadata, seed, delay: Duration::ZERO, failures: 0, reads: AtomicU64::new(0) }
+        Self {
+            metadata,
+            seed,
+            delay: Duration::ZERO,
+            failures: 0,
+            reads: AtomicU64::new(0),
+        }
     }
 
     pub(crate) fn with_imagery(mut self, levels: u8) -> Self {
-        self.metadata.color = Some(ColorMetadata { levels, texels: 256, sources: Vec::new() });
+        self.metadata.color = Some(ColorMetadata {
+            levels,
+            texels: 256,
+            sources: Vec::new(),
+        });
         self
     }
 
@@ -64,7 +79,12 @@ impl Synthetic {
         while let Some(place) = stack.pop() {
             let tile = self.tile(tree.node(place).id);
             tree.arrive(place, Arc::new(tile));
-            stack.extend(tree.node(place).children.iter().filter(|&&child| child != super::NO_NODE));
+            stack.extend(
+                tree.node(place)
+                    .children
+                    .iter()
+                    .filter(|&&child| child != super::NO_NODE),
+            );
         }
         tree
     }
@@ -81,9 +101,18 @@ impl Synthetic {
         }
         let up = self.metadata.finest() - id.level;
         let random = 1.0 + (self.hash(id, 1) % 1000) as f32 / 1000.0;
-        let error = if up == 0 { 0.0 } else { 0.1 * random * f32::from(up).exp2() };
+        let error = if up == 0 {
+            0.0
+        } else {
+            0.1 * random * f32::from(up).exp2()
+        };
         let slack = 100 * i32::from(up);
-        Summary { min: 700 - slack, max: 900 + slack, error, flags: Summary::PRESENT }
+        Summary {
+            min: 700 - slack,
+            max: 900 + slack,
+            error,
+            flags: Summary::PRESENT,
+        }
     }
 
     pub(crate) fn tile(&self, id: TileId) -> Tile {
@@ -103,7 +132,10 @@ impl Synthetic {
         let read = self.reads.fetch_add(1, Ordering::Relaxed);
         std::thread::sleep(self.delay);
         if self.hash(id, read) % 100 < self.failures {
-            return Err(PyramidError::Tile { tile: id, what: "the test says so".into() });
+            return Err(PyramidError::Tile {
+                tile: id,
+                what: "the test says so".into(),
+            });
         }
         Ok(())
     }
@@ -115,7 +147,11 @@ impl TileSource for Synthetic {
     }
 
     fn load(&self, id: TileId, parent: Option<&Tile>) -> Result<Tile, PyramidError> {
-        assert_eq!(id.parent(), parent.map(|parent| parent.id), "a tile is read with its own parent");
+        assert_eq!(
+            id.parent(),
+            parent.map(|parent| parent.id),
+            "a tile is read with its own parent"
+        );
         if id != TileId::ROOT {
             self.read(id)?;
         }

@@ -134,7 +134,11 @@ impl Tree {
     #[must_use]
     pub fn new(metadata: &Metadata, root: Arc<Tile>) -> Self {
         let (grid, frame) = (metadata.grid, metadata.frame());
-        let place = (frame.to_world(grid.origin), frame.step(&grid), metadata.unit());
+        let place = (
+            frame.to_world(grid.origin),
+            frame.step(&grid),
+            metadata.unit(),
+        );
         let mut tree = Self {
             nodes: Vec::new(),
             free: Vec::new(),
@@ -196,7 +200,10 @@ impl Tree {
         let ([x, y], step, _) = self.place;
         let [row, column] = self.grid.first_sample(id).map(|first| first as f64);
         let stride = f64::from(self.grid.stride(id.level));
-        ([x + column * step[0], y + row * step[1]], step.map(|step| step * stride))
+        (
+            [x + column * step[0], y + row * step[1]],
+            step.map(|step| step * stride),
+        )
     }
 
     /// Puts a tile that was read into its node, and makes nodes of its children.
@@ -204,7 +211,10 @@ impl Tree {
         let id = self.node(node).id;
         for (quadrant, child) in id.children().into_iter().enumerate() {
             let summary = tile.children[quadrant];
-            if summary.is_present() && self.grid.has(child) && self.node(node).children[quadrant] == NO_NODE {
+            if summary.is_present()
+                && self.grid.has(child)
+                && self.node(node).children[quadrant] == NO_NODE
+            {
                 let added = self.add(child, summary, node);
                 self.node_mut(node).children[quadrant] = added;
             }
@@ -214,7 +224,10 @@ impl Tree {
 
     /// Takes a tile out of memory and forgets its children; refused, as false, while one of them is in use.
     pub fn evict(&mut self, node: u32) -> bool {
-        let children = self.node(node).children.map(|child| (child != NO_NODE).then_some(child));
+        let children = self
+            .node(node)
+            .children
+            .map(|child| (child != NO_NODE).then_some(child));
         let busy = |child: &u32| {
             let child = self.node(*child);
             !matches!(child.life, Life::Absent | Life::Failed { .. }) || !child.color.is_idle()
@@ -288,7 +301,9 @@ impl Hasher for TileHasher {
     }
 
     fn write(&mut self, bytes: &[u8]) {
-        bytes.iter().for_each(|byte| self.write_u64(u64::from(*byte)));
+        bytes
+            .iter()
+            .for_each(|byte| self.write_u64(u64::from(*byte)));
     }
 
     fn write_u8(&mut self, number: u8) {
@@ -321,7 +336,12 @@ mod tests {
         let (source, mut tree) = tree();
         let child = tree.find(TileId::new(1, 1, 0)).unwrap();
         assert!(tree.find(TileId::new(2, 2, 0)).is_none());
-        let tile = source.load(TileId::new(1, 1, 0), tree.node(Tree::ROOT).tile().map(|tile| &**tile)).unwrap();
+        let tile = source
+            .load(
+                TileId::new(1, 1, 0),
+                tree.node(Tree::ROOT).tile().map(|tile| &**tile),
+            )
+            .unwrap();
         tree.arrive(child, Arc::new(tile));
         assert!(tree.find(TileId::new(2, 2, 0)).is_some());
         assert!(tree.evict(child));

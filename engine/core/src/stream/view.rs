@@ -33,10 +33,21 @@ impl View {
 
     /// A camera at `eye` that looks at `target`, upright; looking straight up or down, north is at the top.
     #[must_use]
-    pub fn looking_at(eye: [f64; 3], target: [f64; 3], fov_y: f64, [width, height]: [u32; 2]) -> Self {
-        let forward = (DVec3::from(target) - DVec3::from(eye)).try_normalize().unwrap_or(DVec3::Y);
+    pub fn looking_at(
+        eye: [f64; 3],
+        target: [f64; 3],
+        fov_y: f64,
+        [width, height]: [u32; 2],
+    ) -> Self {
+        let forward = (DVec3::from(target) - DVec3::from(eye))
+            .try_normalize()
+            .unwrap_or(DVec3::Y);
         let side = forward.cross(DVec3::Z);
-        let right = if side.length() < 1e-9 { DVec3::X } else { side.normalize() };
+        let right = if side.length() < 1e-9 {
+            DVec3::X
+        } else {
+            side.normalize()
+        };
         let up = right.cross(forward);
         Self {
             eye,
@@ -106,8 +117,13 @@ impl Frustum {
     /// False only when the box is wholly outside; a few boxes near the edges are let through.
     #[must_use]
     pub fn sees(&self, bounds: &Bounds) -> bool {
-        let (low, high) = (DVec3::from(bounds.min) - self.eye, DVec3::from(bounds.max) - self.eye);
-        self.planes.iter().all(|plane| plane.dot(DVec3::select(plane.cmpge(DVec3::ZERO), high, low)) >= 0.0)
+        let (low, high) = (
+            DVec3::from(bounds.min) - self.eye,
+            DVec3::from(bounds.max) - self.eye,
+        );
+        self.planes
+            .iter()
+            .all(|plane| plane.dot(DVec3::select(plane.cmpge(DVec3::ZERO), high, low)) >= 0.0)
     }
 }
 
@@ -125,25 +141,38 @@ impl Bounds {
     #[must_use]
     pub fn distance(&self, point: [f64; 3]) -> f64 {
         let point = DVec3::from(point);
-        (DVec3::from(self.min) - point).max(point - DVec3::from(self.max)).max(DVec3::ZERO).length()
+        (DVec3::from(self.min) - point)
+            .max(point - DVec3::from(self.max))
+            .max(DVec3::ZERO)
+            .length()
     }
 
     /// Pixels of the rectangle around the box on the screen, cut at the screen's edges; the whole screen when the box
     /// reaches behind the camera.
     #[must_use]
     pub fn screen_area(&self, view: &View) -> f64 {
-        let [eye, right, up, forward] = [view.eye, view.right, view.up, view.forward].map(DVec3::from);
+        let [eye, right, up, forward] =
+            [view.eye, view.right, view.up, view.forward].map(DVec3::from);
         let (width, height) = (f64::from(view.width), f64::from(view.height));
         let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
         for corner in 0..8 {
-            let pick = |axis: usize| if corner >> axis & 1 == 0 { self.min[axis] } else { self.max[axis] };
+            let pick = |axis: usize| {
+                if corner >> axis & 1 == 0 {
+                    self.min[axis]
+                } else {
+                    self.max[axis]
+                }
+            };
             let ray = DVec3::new(pick(0), pick(1), pick(2)) - eye;
             let depth = ray.dot(forward);
             if depth <= view.near {
                 return width * height;
             }
             let scale = view.pixels_per_radian() / depth;
-            let place = [0.5 * width + ray.dot(right) * scale, 0.5 * height - ray.dot(up) * scale];
+            let place = [
+                0.5 * width + ray.dot(right) * scale,
+                0.5 * height - ray.dot(up) * scale,
+            ];
             for axis in 0..2 {
                 low[axis] = low[axis].min(place[axis]);
                 high[axis] = high[axis].max(place[axis]);
@@ -159,7 +188,10 @@ mod tests {
     use super::*;
 
     fn cube(centre: [f64; 3]) -> Bounds {
-        Bounds { min: centre.map(|at| at - 1.0), max: centre.map(|at| at + 1.0) }
+        Bounds {
+            min: centre.map(|at| at - 1.0),
+            max: centre.map(|at| at + 1.0),
+        }
     }
 
     #[test]
@@ -190,7 +222,12 @@ mod tests {
 
     #[test]
     fn a_box_covers_its_rectangle() {
-        let view = View::looking_at([0.0; 3], [0.0, 1.0, 0.0], std::f64::consts::FRAC_PI_2, [200, 200]);
+        let view = View::looking_at(
+            [0.0; 3],
+            [0.0, 1.0, 0.0],
+            std::f64::consts::FRAC_PI_2,
+            [200, 200],
+        );
         let area = cube([0.0, 11.0, 0.0]).screen_area(&view);
         assert!((area - 400.0).abs() < 1e-9);
     }
