@@ -2,3 +2,4 @@
 
 mod gpu_parity;
 mod layers;
+mod shared_structs;
