@@ -2,7 +2,9 @@
 //!
 //! Every stage's reference gets what the device's stage before it made, so a difference shows where it arises.
 
-use drumlin::{Headless, Offscreen, Renderer, RendererDescriptor, TargetFormats, offscreen, wgpu};
+use drumlin::{
+    Headless, Offscreen, PoolSizes, Renderer, RendererDescriptor, TargetFormats, offscreen, wgpu,
+};
 use drumlin_core::{
     geo::{PATCH_COUNT, TILE_SAMPLE_COUNT},
     reference::{
@@ -38,9 +40,13 @@ fn gpu() -> Option<Headless> {
 fn renderer(gpu: &Headless) -> Renderer {
     let descriptor = RendererDescriptor {
         formats: TargetFormats::default(),
-        vram_budget_bytes: 20 << 20,
+        sizes: PoolSizes {
+            slots: 64,
+            color_layers: 0,
+            max_drawn: 64,
+            index_capacity: 655_360,
+        },
         unit: scene::UNIT,
-        imagery: false,
     };
     Renderer::new(&gpu.device, &gpu.queue, &descriptor).expect("a renderer")
 }

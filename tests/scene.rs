@@ -198,6 +198,7 @@ pub fn plan(camera: &Camera, cut: &[TileId]) -> FramePlan {
         color_uploads: Vec::new(),
         frame: Some(frame(camera, cut.len())),
         drawn: drawn_tiles(camera, cut, &resident),
+        places: Vec::new(),
     }
 }
 
