@@ -23,20 +23,6 @@ use drumlin_tests::scene::{self, Camera};
 const BACKGROUND: [f64; 4] = [1.0, 0.0, 1.0, 1.0];
 const SIZE: [u32; 2] = [640, 360];
 
-/// A device; none, said aloud, where there is no adapter and `REQUIRE_GPU` does not insist.
-fn gpu() -> Option<Headless> {
-    match Headless::new() {
-        Ok(gpu) => Some(gpu),
-        Err(error) if std::env::var("REQUIRE_GPU").is_ok_and(|value| value == "1") => {
-            panic!("{error}")
-        }
-        Err(error) => {
-            println!("skipped: {error}");
-            None
-        }
-    }
-}
-
 fn renderer(gpu: &Headless) -> Renderer {
     let descriptor = RendererDescriptor {
         formats: TargetFormats::default(),
@@ -237,7 +223,9 @@ fn completed(gpu_frame: &Frame, renderer: &Renderer) -> Frame {
 
 #[test]
 fn every_stage_does_what_its_reference_does() {
-    let Some(gpu) = gpu() else { return };
+    let Some(gpu) = drumlin_tests::gpu() else {
+        return;
+    };
     let mut renderer = renderer(&gpu);
     let cut = scene::mixed_cut();
     let mut plan = scene::plan(&Camera::over_the_hill(SIZE), &cut);
@@ -283,7 +271,9 @@ fn every_stage_does_what_its_reference_does() {
 
 #[test]
 fn voids_are_holes_and_only_there() {
-    let Some(gpu) = gpu() else { return };
+    let Some(gpu) = drumlin_tests::gpu() else {
+        return;
+    };
     let mut renderer = renderer(&gpu);
     let mut plan = scene::plan(&Camera::from_above(SIZE), &scene::mixed_cut());
     let first_drawn = plan.drawn[0].slot;
@@ -324,7 +314,9 @@ fn voids_are_holes_and_only_there() {
 
 #[test]
 fn a_hill_of_two_levels_has_no_holes() {
-    let Some(gpu) = gpu() else { return };
+    let Some(gpu) = drumlin_tests::gpu() else {
+        return;
+    };
     let mut renderer = renderer(&gpu);
     let plan = scene::plan(&Camera::over_the_hill(SIZE), &scene::mixed_cut());
     let picture = render(&gpu, &mut renderer, &plan);
