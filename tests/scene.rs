@@ -63,7 +63,7 @@ fn step(level: u8) -> f64 {
 fn noise(a: i64, b: i64) -> f64 {
     let mixed = (a.wrapping_mul(0x9e37_79b9) ^ b.wrapping_mul(0x85eb_ca6b)).cast_unsigned();
     let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(0x2c1b_3c6d);
-    f64::from((mixed >> 12) as u16) / 65_536.0
+    f64::from(u32::try_from(mixed >> 40).unwrap_or(0)) / 16_777_216.0
 }
 
 /// A tile of the scene: the hill as its cage, a little noise as its residual.
