@@ -211,6 +211,12 @@ fn skirt(patch_index: u32, edge: u32, stride: u32) {
     }
 }
 
+// Triangles of a template: split edges, or fours beside a coarser tile.
+fn is_transition(word: u32, shift: u32) -> bool {
+    let is_beside_coarser = word_depth(word, shift) == FINEST_DEPTH && word_coarser(word) != 0u;
+    return word_split(word, shift) != 0u || is_beside_coarser;
+}
+
 fn write_patch(patch_index: u32, word: u32, shift: u32) {
     surface(patch_index, word, shift);
     let skirts = skirt_edges(patch_index);
@@ -219,7 +225,7 @@ fn write_patch(patch_index: u32, word: u32, shift: u32) {
             skirt(patch_index, edge, edge_stride(word, shift, edge));
         }
     }
-    let kind = word_depth(word, shift) + select(3u, 0u, word_split(word, shift) == 0u);
+    let kind = word_depth(word, shift) + select(0u, 3u, is_transition(word, shift));
     atomicAdd(&draw_list[CLASS_COUNTS_WORD + kind], 1u);
 }
 

@@ -1,6 +1,6 @@
 //! A file that many threads read at once, every read checked against its length before memory is taken for it.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -17,14 +17,15 @@ pub(super) struct Bytes {
 impl Bytes {
     /// Opens a file of at least one byte.
     pub(super) fn open(path: &Path) -> Result<Self, DemError> {
-        let file = File::open(path).map_err(|error| DemError::io(path, error))?;
-        let info = file.metadata().map_err(|error| DemError::io(path, error))?;
+        // Looked at before it is opened: opening a pipe would wait for a writer.
+        let info = fs::metadata(path).map_err(|error| DemError::io(path, error))?;
         if !info.is_file() {
             return Err(DemError::format(path, "is not a regular file"));
         }
         if info.len() == 0 {
             return Err(DemError::format(path, "the file is empty"));
         }
+        let file = File::open(path).map_err(|error| DemError::io(path, error))?;
         Ok(Self {
             file,
             path: path.to_owned(),

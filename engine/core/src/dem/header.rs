@@ -1,5 +1,7 @@
 //! What is known of a raster before any sample is read, and how a caller helps where the file is silent.
 
+use std::path::Path;
+
 use super::DemError;
 use crate::geo::{Crs, Grid};
 
@@ -107,6 +109,23 @@ pub struct OpenOptions {
 }
 
 impl OpenOptions {
+    /// Refuses numbers that would make no grid and no heights.
+    pub(crate) fn check(&self, path: &Path) -> Result<(), DemError> {
+        let senseless = |what: &str, value: f64| {
+            Err(DemError::format(
+                path,
+                format!("cannot be read with a {what} of {value}"),
+            ))
+        };
+        match (self.spacing, self.scale) {
+            (Some(spacing), _) if !(spacing.is_finite() && spacing > 0.0) => {
+                senseless("spacing", spacing)
+            }
+            (_, Some(scale)) if !scale.is_normal() => senseless("scale", scale),
+            _ => Ok(()),
+        }
+    }
+
     /// The budget for decoded strips and tiles.
     pub(crate) fn cache_bytes(&self) -> usize {
         self.cache_bytes.unwrap_or(64 << 20)

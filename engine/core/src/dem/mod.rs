@@ -57,6 +57,7 @@ pub trait Raster: Send + Sync {
 /// # Errors
 /// [`DemError`], naming the file, the place in it and the limit.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Raster>, DemError> {
+    options.check(path)?;
     let bytes = Bytes::open(path)?;
     let head = bytes.head(1024)?;
     if Ifd::matches(&head) {

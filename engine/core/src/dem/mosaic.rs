@@ -37,31 +37,7 @@ impl Mosaic {
             check_fits(&first, raster.header(), rasters.len())?;
             places.push(lattice_place(&first, raster.header())?);
         }
-        let sizes = rasters
-            .iter()
-            .map(|raster| [raster.header().grid.rows, raster.header().grid.columns]);
-        let ends = places
-            .iter()
-            .zip(sizes)
-            .map(|(place, size)| [0, 1].map(|i| place[i] + i64::from(size[i])));
-        let start = places
-            .iter()
-            .fold([i64::MAX; 2], |a, b| [a[0].min(b[0]), a[1].min(b[1])]);
-        let end = ends.fold([i64::MIN; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
-        let last = &rasters[rasters.len() - 1].header().source.name;
-        let side = |axis: usize| -> Result<u32, DemError> {
-            let count = u32::try_from(end[axis] - start[axis])
-                .ok()
-                .filter(|&count| count <= MAX_SIDE);
-            let what = "they lie too far apart for one grid";
-            count.ok_or_else(|| mismatch(&first.source.name, last, what))
-        };
-        let grid = Grid {
-            rows: side(0)?,
-            columns: side(1)?,
-            origin: first.grid.position(start[0] as f64, start[1] as f64),
-            step: first.grid.step,
-        };
+        let (start, grid) = union(&first, &rasters, &places)?;
         let headers = || rasters.iter().map(|raster| raster.header());
         let header = RasterHeader {
             grid,
@@ -140,6 +116,41 @@ impl Part {
             columns: column_end - column,
         })
     }
+}
+
+/// The least row and column of the rasters in the first one's lattice, and the grid around all.
+fn union(
+    first: &RasterHeader,
+    rasters: &[Box<dyn Raster>],
+    places: &[[i64; 2]],
+) -> Result<([i64; 2], Grid), DemError> {
+    let (mut start, mut end) = ([i64::MAX; 2], [i64::MIN; 2]);
+    for (raster, place) in rasters.iter().zip(places) {
+        let grid = &raster.header().grid;
+        for (axis, count) in [grid.rows, grid.columns].into_iter().enumerate() {
+            start[axis] = start[axis].min(place[axis]);
+            end[axis] = end[axis].max(place[axis] + i64::from(count));
+        }
+        if [0, 1]
+            .iter()
+            .any(|&axis| end[axis] - start[axis] > i64::from(MAX_SIDE))
+        {
+            let what = "they lie too far apart for one grid";
+            return Err(mismatch(
+                &first.source.name,
+                &raster.header().source.name,
+                what,
+            ));
+        }
+    }
+    let count = |axis: usize| u32::try_from(end[axis] - start[axis]).unwrap_or(MAX_SIDE);
+    let grid = Grid {
+        rows: count(0),
+        columns: count(1),
+        origin: first.grid.position(start[0] as f64, start[1] as f64),
+        step: first.grid.step,
+    };
+    Ok((start, grid))
 }
 
 /// Where in a window's buffer a row of a smaller window lies.

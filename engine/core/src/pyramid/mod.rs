@@ -9,7 +9,7 @@ mod query;
 mod reader;
 mod record;
 #[cfg(test)]
-mod sample;
+pub(crate) mod sample;
 mod shard;
 mod store;
 pub mod surface;

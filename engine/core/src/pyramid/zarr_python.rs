@@ -30,9 +30,9 @@ for level in range(len(root.attrs["levels"])):
             cage, heights = tile(root, level, row, column)
             assert np.array_equal(heights, want[at]), (level, row, column)
             if tile_rule:
-                record, it = array[row, column].tobytes(), root.attrs["levels"][level]
-                kind, size = {1: "i1", 2: "<i2", 4: "<i4"}[it["detail_bytes"]], 16641 * it["detail_bytes"]
-                detail = np.frombuffer(record[-size:], kind).reshape(129, 129)
+                it, width = root.attrs["levels"][level], root.attrs["levels"][level]["detail_bytes"]
+                planes = array[row, column][-16641 * width:].view("i1").reshape(width, 129, 129)
+                detail = sum(plane.astype(np.int64) << 8 * d for d, plane in enumerate(planes))
                 assert np.array_equal(tile_rule.decode(cage, detail, it["step"]), heights)
                 if not it["key"]:
                     parent = tile(root, level - 1, row // 2, column // 2)[0]

@@ -1,7 +1,7 @@
 //! emit: patches become one list of indices and the arguments of its draw.
 //!
 //! Reads frame, tiles, pool (voids) and patches; writes the head of the list (zero before) and indices. Steps in order:
-//! [`count`] (indices at every shift), [`write`] (at the least shift that fits; when none does, nothing is drawn).
+//! [`count`] (indices at every shift), [`write()`] (at the least shift that fits; when none does, nothing is drawn).
 //! Triangles wind counter-clockwise seen from above. Every vertex is that of the tile that owns its sample.
 //! A GPU reserves the list in any order, 64 patches at a time; here they are in order.
 //!
@@ -231,6 +231,12 @@ impl Writer<'_> {
     }
 }
 
+/// True where a patch has triangles of a template: split edges, or fours beside a coarser tile.
+fn is_transition(word: u32, shift: u32) -> bool {
+    let is_beside_coarser = word_depth(word, shift) == FINEST_DEPTH && word_coarser(word) != 0;
+    word_split(word, shift) != 0 || is_beside_coarser
+}
+
 /// The first place, clockwise, of a patch's part of a side.
 fn skirt_start(patch: u32, edge: u32) -> u32 {
     let row = patch / TILE_QUADS * QUAD_SAMPLES;
@@ -277,7 +283,7 @@ pub fn write(
                 writer.at, draw_list[CURSOR_WORD] as usize,
                 "counted as written"
             );
-            let is_transition = word_split(word, shift) != 0;
+            let is_transition = is_transition(word, shift);
             let class = word_depth(word, shift) as usize + if is_transition { 3 } else { 0 };
             draw_list[CLASS_COUNTS_WORD + class] += 1;
         }

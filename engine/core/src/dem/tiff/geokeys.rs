@@ -132,7 +132,7 @@ impl GeoKeys {
         let unit_metres = match self.shorts.get(&LINEAR_UNIT) {
             Some(&USER_DEFINED) => self.doubles.get(&LINEAR_UNIT_METRES).copied(),
             Some(&code) => units::from_code(code),
-            None => Some(1.0),
+            None => Some(self.named_unit()),
         };
         let unit_metres = unit_metres.filter(|unit| unit.is_finite() && *unit > 0.0);
         let unit_metres = unit_metres.ok_or("an unknown unit of length (GeoKeys 3076, 3077)")?;
@@ -143,6 +143,20 @@ impl GeoKeys {
             ellipsoid: self.ellipsoid(),
             unit_metres,
         })
+    }
+
+    /// The unit of a system whose keys name none: its name tells feet, as in "NAD83 / California zone 6 (ftUS)".
+    fn named_unit(&self) -> f64 {
+        let name = self
+            .name([PROJECTED_CITATION, CITATION])
+            .unwrap_or_default();
+        if name.contains("(ftUS)") {
+            units::US_FOOT
+        } else if name.contains("(ft)") {
+            units::FOOT
+        } else {
+            1.0
+        }
     }
 
     fn code(&self, key: u16) -> Option<String> {
@@ -264,6 +278,16 @@ mod tests {
             (Some("EPSG:2927"), units::US_FOOT)
         );
         assert_eq!(keys.vertical_unit(), Some(units::FOOT));
+    }
+
+    #[test]
+    fn a_system_without_a_unit_may_name_it() {
+        let mut keys = GeoKeys::default();
+        keys.shorts.extend([(MODEL_TYPE, 1), (PROJECTED, 2230)]);
+        assert_eq!(keys.crs().map(|crs| crs.unit_metres), Ok(1.0));
+        keys.texts
+            .insert(CITATION, "NAD83 / California zone 6 (ftUS)".into());
+        assert_eq!(keys.crs().map(|crs| crs.unit_metres), Ok(units::US_FOOT));
     }
 
     #[test]

@@ -16,6 +16,7 @@ const MAX_VALUE_BYTES: u64 = 1 << 20;
 
 /// Tags that are read.
 pub(crate) mod tag {
+    pub(crate) const SUBFILE_KIND: u16 = 254;
     pub(crate) const WIDTH: u16 = 256;
     pub(crate) const HEIGHT: u16 = 257;
     pub(crate) const BITS: u16 = 258;
@@ -57,6 +58,9 @@ struct Entry {
 #[derive(Debug)]
 pub(crate) struct Ifd {
     pub(crate) big_endian: bool,
+    /// Where the next directory is said to lie.
+    pub(crate) next: Option<u64>,
+    big: bool,
     entries: BTreeMap<u16, Entry>,
 }
 
@@ -127,9 +131,26 @@ impl Ifd {
                 format!("the first directory is said to lie at byte {first}, inside the header");
             return Err(DemError::format(bytes.path(), what));
         }
-        let entries = read_entries(bytes, order, big, first)?;
+        Self::read_directory(bytes, order, big, first)
+    }
+
+    /// Another directory of the same file.
+    pub(crate) fn read_at(&self, bytes: &Bytes, at: u64) -> Result<Self, DemError> {
+        Self::read_directory(bytes, self.order(), self.big, at)
+    }
+
+    fn read_directory(bytes: &Bytes, order: Order, big: bool, at: u64) -> Result<Self, DemError> {
+        let (entries, end) = read_entries(bytes, order, big, at)?;
+        // Some files end before the pointer to the next directory; then there is none.
+        let pointer = bytes.read(end, if big { 8 } else { 4 }, || "the next directory".into());
+        let next = pointer
+            .ok()
+            .map(|pointer| order.unsigned(&pointer))
+            .filter(|&next| next != 0);
         Ok(Self {
             big_endian: order.big_endian,
+            next,
+            big,
             entries,
         })
     }
@@ -258,15 +279,16 @@ impl Ifd {
     }
 }
 
+/// The tags of a directory, and where they end.
 fn read_entries(
     bytes: &Bytes,
     order: Order,
     big: bool,
     at: u64,
-) -> Result<BTreeMap<u16, Entry>, DemError> {
+) -> Result<(BTreeMap<u16, Entry>, u64), DemError> {
     let (count_bytes, entry_bytes, count_at, inline) =
         if big { (8, 20, 4, 8) } else { (2, 12, 4, 4) };
-    let count = order.unsigned(&bytes.read(at, count_bytes, || "the first directory".into())?);
+    let count = order.unsigned(&bytes.read(at, count_bytes, || "a directory".into())?);
     if count > MAX_ENTRIES {
         let what = format!("a directory of {count} tags");
         return Err(DemError::limit(
@@ -302,5 +324,5 @@ fn read_entries(
             offset,
         });
     }
-    Ok(entries)
+    Ok((entries, table_at + count * entry_bytes))
 }

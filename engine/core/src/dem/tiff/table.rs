@@ -30,19 +30,35 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// Reads the tables (of `planes` bands that lie apart, or 1) and checks that every chunk lies in the file and may be as large as it says.
+    /// Reads the tables (of `planes` bands that lie apart, or 1) and checks that every chunk lies in the file and may
+    /// be as large as it says.
     pub(super) fn read(
         bytes: &Bytes,
         ifd: &Ifd,
         coding: &Coding,
         planes: u16,
     ) -> Result<Self, DemError> {
+        Self::read_any(bytes, ifd, coding, planes, 1)
+    }
+
+    /// The same for one bit a sample; widths are then bytes.
+    pub(super) fn read_packed(bytes: &Bytes, ifd: &Ifd, coding: &Coding) -> Result<Self, DemError> {
+        Self::read_any(bytes, ifd, coding, 1, 8)
+    }
+
+    fn read_any(
+        bytes: &Bytes,
+        ifd: &Ifd,
+        coding: &Coding,
+        planes: u16,
+        samples_a_byte: u32,
+    ) -> Result<Self, DemError> {
         let [width, height] = [tag::WIDTH, tag::HEIGHT].map(|tag| require(bytes, ifd, tag));
-        let (width, height) = (width?, height?);
+        let (width, height) = (width?.div_ceil(samples_a_byte), height?);
         let tiled = ifd.has(tag::TILE_OFFSETS);
         let (chunk_columns, chunk_rows) = if tiled {
             (
-                require(bytes, ifd, tag::TILE_WIDTH)?,
+                require(bytes, ifd, tag::TILE_WIDTH)?.div_ceil(samples_a_byte),
                 require(bytes, ifd, tag::TILE_HEIGHT)?,
             )
         } else {

@@ -144,7 +144,7 @@ impl PyramidWriter {
             tiles,
             shard,
             chunk_bytes: layout.byte_count(),
-            sections: layout.sections().into(),
+            sections: layout.sections(),
         };
         self.write_block(key, &block, records)
     }

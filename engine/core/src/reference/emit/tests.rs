@@ -1,6 +1,6 @@
 //! Laws of balance and emit together, on small drawn lists with random depths.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 use super::*;
 use crate::{
@@ -130,27 +130,24 @@ fn surface(emitted: &Emitted) -> impl Iterator<Item = &[u32]> {
 
 /// Every edge has its opposite exactly once but on the data's border, whose length comes back.
 fn assert_watertight(scene: &Scene, emitted: &Emitted) -> i64 {
-    let mut edges = HashSet::new();
-    for triangle in surface(emitted) {
-        for i in 0..3 {
-            let edge = (triangle[i], triangle[(i + 1) % 3]);
-            assert!(
-                edges.insert(edge),
-                "an edge twice in one direction: {edge:?}"
-            );
-        }
-    }
+    let mut edges: Vec<[u32; 2]> = surface(emitted)
+        .flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]])
+        .collect();
+    edges.sort_unstable();
+    assert!(
+        edges.windows(2).all(|pair| pair[0] != pair[1]),
+        "an edge twice in one direction"
+    );
     let mut border = 0;
-    for &(a, b) in edges
-        .iter()
-        .filter(|edge| !edges.contains(&(edge.1, edge.0)))
-    {
-        let (from, to) = (place(scene, a), place(scene, b));
-        assert!(
-            is_on_border(scene, from, to),
-            "open edge {from:?} to {to:?}"
-        );
-        border += (from[0] - to[0]).abs() + (from[1] - to[1]).abs();
+    for &[a, b] in &edges {
+        if edges.binary_search(&[b, a]).is_err() {
+            let (from, to) = (place(scene, a), place(scene, b));
+            assert!(
+                is_on_border(scene, from, to),
+                "open edge {from:?} to {to:?}"
+            );
+            border += (from[0] - to[0]).abs() + (from[1] - to[1]).abs();
+        }
     }
     border
 }
@@ -190,27 +187,29 @@ fn every_edge_is_shared_by_two_triangles_and_the_ground_is_tiled_once() {
     for scene in scenes() {
         for kind in 0..3 {
             let depths = random_depths(scene.tiles.len(), kind, &mut state);
-            for shift in 0..SHIFT_COUNT {
+            // Shifts lessen depths, whose law is below: one kind is enough.
+            for shift in 0..if kind == 0 { SHIFT_COUNT } else { 1 } {
                 let emitted = emit(&scene, &pages, &depths, shift);
                 let border = assert_watertight(&scene, &emitted);
                 assert_eq!(border, perimeter(&scene));
                 let mut twice = 0;
-                let mut owner = HashMap::new();
+                let mut owners = Vec::new();
                 for triangle in surface(&emitted) {
                     let [a, b, c] = [0, 1, 2].map(|i| place(&scene, triangle[i]));
                     // Rows count south: counter-clockwise seen from above is positive here.
                     let doubled = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
                     assert!(doubled > 0, "{a:?} {b:?} {c:?}");
                     twice += doubled;
-                    for (&index, at) in triangle.iter().zip([a, b, c]) {
-                        assert_eq!(
-                            *owner.entry(at).or_insert(index),
-                            index,
-                            "two vertices at {at:?}"
-                        );
-                    }
+                    owners.extend([(a, triangle[0]), (b, triangle[1]), (c, triangle[2])]);
                 }
                 assert_eq!(twice, 2 * area(&scene));
+                owners.sort_unstable();
+                owners.dedup();
+                let is_double = |pair: &[([i64; 2], u32)]| pair[0].0 == pair[1].0;
+                assert!(
+                    !owners.windows(2).any(is_double),
+                    "two vertices at one place"
+                );
             }
         }
     }
