@@ -20,7 +20,7 @@ pub enum Side {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Neighbours {
     /// Across the north, east, south and west side; the west or north half first. Both halves are equal but where the
-    /// neighbours are finer.
+    /// neighbours are finer; of these one may be missing, where the data set ends in the middle of the side.
     pub sides: [[Side; 2]; 4],
     /// The drawn tile that owns each corner, NW, NE, SW, SE: the coarsest of those that touch it, of these the first
     /// by row and column.
