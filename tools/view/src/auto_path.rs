@@ -20,9 +20,16 @@ const LOOKS: u32 = 48;
 pub(crate) type Ground<'a> = &'a dyn Fn([f64; 2]) -> Option<f64>;
 
 /// The keys of a flight over an extent of CRS coordinates.
-pub(crate) fn auto_path(extent: &Extent, frame: &WorldFrame, ground: Ground<'_>) -> Result<Vec<Key>> {
+pub(crate) fn auto_path(
+    extent: &Extent,
+    frame: &WorldFrame,
+    ground: Ground<'_>,
+) -> Result<Vec<Key>> {
     let [low, high] = [frame.to_world(extent.min), frame.to_world(extent.max)];
-    let half = [0.5 * (high[0] - low[0]).abs(), 0.5 * (high[1] - low[1]).abs()];
+    let half = [
+        0.5 * (high[0] - low[0]).abs(),
+        0.5 * (high[1] - low[1]).abs(),
+    ];
     let size = half[0].max(half[1]).max(1e-3);
     let survey = Survey::new(extent, ground);
     // Narrow strips still get a round flight: past their sides, at the height of the ground inside.
@@ -36,7 +43,10 @@ pub(crate) fn auto_path(extent: &Extent, frame: &WorldFrame, ground: Ground<'_>)
             let part = f64::from(index) / f64::from(KEY_COUNT - 1);
             let (sin, cos) = (TAU * (0.9 * part + 0.5)).sin_cos();
             let radius = 0.85 - 0.35 * (TAU * 0.5 * part).sin();
-            let eye = frame.to_crs([middle[0] + radius * reach[0] * sin, middle[1] + radius * reach[1] * cos]);
+            let eye = frame.to_crs([
+                middle[0] + radius * reach[0] * sin,
+                middle[1] + radius * reach[1] * cos,
+            ]);
             let target = frame.to_crs(focus);
             let low = ground(eye).unwrap_or(survey.lowest);
             let aim = ground(target).unwrap_or(0.5 * (survey.lowest + survey.highest));
@@ -55,7 +65,13 @@ pub(crate) fn auto_path(extent: &Extent, frame: &WorldFrame, ground: Ground<'_>)
 /// Raises keys until the path keeps its distance from the ground everywhere.
 fn lift(keys: &mut [Key], frame: &WorldFrame, ground: Ground<'_>, clearance: f64) -> Result<()> {
     for _ in 0..LIFTS {
-        let lacks = lacking(&Path::new(keys, frame)?, keys.len(), frame, ground, clearance);
+        let lacks = lacking(
+            &Path::new(keys, frame)?,
+            keys.len(),
+            frame,
+            ground,
+            clearance,
+        );
         if lacks.iter().all(|&lack| lack == 0.0) {
             break;
         }
@@ -67,12 +83,20 @@ fn lift(keys: &mut [Key], frame: &WorldFrame, ground: Ground<'_>, clearance: f64
 }
 
 /// How many metres the path is too low around each of its keys.
-fn lacking(path: &Path, keys: usize, frame: &WorldFrame, ground: Ground<'_>, clearance: f64) -> Vec<f64> {
+fn lacking(
+    path: &Path,
+    keys: usize,
+    frame: &WorldFrame,
+    ground: Ground<'_>,
+    clearance: f64,
+) -> Vec<f64> {
     let mut lacks = vec![0.0_f64; keys];
     for index in 0..=CHECKED {
         let part = f64::from(index) / f64::from(CHECKED);
         let eye = path.camera(part * path.seconds()).eye;
-        let Some(height) = ground(frame.to_crs([eye.x, eye.y])) else { continue };
+        let Some(height) = ground(frame.to_crs([eye.x, eye.y])) else {
+            continue;
+        };
         let lack = (height + clearance - eye.z).max(0.0);
         let place = index as usize * (keys - 1);
         for key in [place / CHECKED as usize, place.div_ceil(CHECKED as usize)] {
@@ -92,7 +116,11 @@ struct Survey {
 
 impl Survey {
     fn new(extent: &Extent, ground: Ground<'_>) -> Self {
-        let mut survey = Self { lowest: f64::INFINITY, highest: f64::NEG_INFINITY, summit: extent.center() };
+        let mut survey = Self {
+            lowest: f64::INFINITY,
+            highest: f64::NEG_INFINITY,
+            summit: extent.center(),
+        };
         for index in 0..LOOKS * LOOKS {
             let part = |i: u32| (f64::from(i) + 0.5) / f64::from(LOOKS);
             let at = [
@@ -116,13 +144,20 @@ impl Survey {
 mod tests {
     use super::*;
 
-    const EXTENT: Extent = Extent { min: [0.0, 0.0], max: [1000.0, 600.0] };
-    const FRAME: WorldFrame = WorldFrame { world_from_crs: [[1.0, 0.0, -500.0], [0.0, 1.0, -300.0]] };
+    const EXTENT: Extent = Extent {
+        min: [0.0, 0.0],
+        max: [1000.0, 600.0],
+    };
+    const FRAME: WorldFrame = WorldFrame {
+        world_from_crs: [[1.0, 0.0, -500.0], [0.0, 1.0, -300.0]],
+    };
 
     #[test]
     fn the_flight_never_meets_the_ground() {
         let hills = |[x, y]: [f64; 2]| {
-            EXTENT.contains([x, y]).then(|| 200.0 * (x / 40.0).sin() * (y / 55.0).cos() + 0.3 * x)
+            EXTENT
+                .contains([x, y])
+                .then(|| 200.0 * (x / 40.0).sin() * (y / 55.0).cos() + 0.3 * x)
         };
         let keys = auto_path(&EXTENT, &FRAME, &hills).unwrap();
         let path = Path::new(&keys, &FRAME).unwrap();
@@ -135,7 +170,10 @@ mod tests {
 
     #[test]
     fn a_data_set_of_voids_and_one_of_one_sample_still_fly() {
-        let point = Extent { min: [3.0, 4.0], max: [3.0, 4.0] };
+        let point = Extent {
+            min: [3.0, 4.0],
+            max: [3.0, 4.0],
+        };
         for extent in [EXTENT, point] {
             let keys = auto_path(&extent, &FRAME, &|_| None).unwrap();
             assert!(Path::new(&keys, &FRAME).is_ok());

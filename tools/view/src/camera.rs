@@ -22,7 +22,13 @@ impl Camera {
     pub(crate) fn look_at(eye: DVec3, target: DVec3, fov_y_degrees: f64) -> Self {
         let forward = (target - eye).try_normalize().unwrap_or(DVec3::Y);
         let right = forward.cross(DVec3::Z).try_normalize().unwrap_or(DVec3::X);
-        Self { eye, right, up: right.cross(forward), forward, fov_y_degrees }
+        Self {
+            eye,
+            right,
+            up: right.cross(forward),
+            forward,
+            fov_y_degrees,
+        }
     }
 
     /// A camera with a level horizon from its heading (radians from north, clockwise) and its pitch (radians, up is
@@ -32,7 +38,13 @@ impl Camera {
         let level = DVec3::new(sin, cos, 0.0);
         let right = DVec3::new(cos, -sin, 0.0);
         let forward = level * pitch.cos() + DVec3::Z * pitch.sin();
-        Self { eye, right, up: right.cross(forward), forward, fov_y_degrees }
+        Self {
+            eye,
+            right,
+            up: right.cross(forward),
+            forward,
+            fov_y_degrees,
+        }
     }
 
     /// Heading and pitch, as [`Camera::from_angles`] takes them.
@@ -47,7 +59,9 @@ mod tests {
     use super::*;
 
     fn assert_orthonormal(camera: &Camera) {
-        let Camera { right, up, forward, .. } = *camera;
+        let Camera {
+            right, up, forward, ..
+        } = *camera;
         assert!((right.cross(forward) - up).length() < 1e-12);
         assert!((right.length() - 1.0).abs() < 1e-12 && (up.length() - 1.0).abs() < 1e-12);
         assert!(right.dot(forward).abs() < 1e-12);
@@ -56,12 +70,20 @@ mod tests {
     #[test]
     fn looking_north_has_east_on_the_right_and_the_sky_above() {
         let camera = Camera::look_at(DVec3::ZERO, DVec3::new(0.0, 9.0, 0.0), 45.0);
-        assert_eq!((camera.right, camera.up, camera.forward), (DVec3::X, DVec3::Z, DVec3::Y));
+        assert_eq!(
+            (camera.right, camera.up, camera.forward),
+            (DVec3::X, DVec3::Z, DVec3::Y)
+        );
     }
 
     #[test]
     fn axes_are_orthonormal_even_straight_down() {
-        for target in [DVec3::new(3.0, -2.0, 1.0), DVec3::NEG_Z, DVec3::Z, DVec3::ZERO] {
+        for target in [
+            DVec3::new(3.0, -2.0, 1.0),
+            DVec3::NEG_Z,
+            DVec3::Z,
+            DVec3::ZERO,
+        ] {
             assert_orthonormal(&Camera::look_at(DVec3::ZERO, target, 45.0));
         }
     }

@@ -32,7 +32,10 @@ struct CameraRow {
 impl Cameras {
     /// No frames yet.
     pub(crate) fn new(frame: &WorldFrame) -> Self {
-        Self { world_from_crs: frame.world_from_crs, frames: Vec::new() }
+        Self {
+            world_from_crs: frame.world_from_crs,
+            frames: Vec::new(),
+        }
     }
 
     /// Adds a frame.
@@ -64,7 +67,9 @@ mod tests {
 
     #[test]
     fn a_frame_is_written_as_documented() {
-        let frame = WorldFrame { world_from_crs: [[2.0, 0.0, 1.0], [0.0, 3.0, 4.0]] };
+        let frame = WorldFrame {
+            world_from_crs: [[2.0, 0.0, 1.0], [0.0, 3.0, 4.0]],
+        };
         let mut cameras = Cameras::new(&frame);
         cameras.push(&Camera::look_at(DVec3::ZERO, DVec3::Y, 45.0), [640, 360]);
         let value: Value = serde_json::to_value(&cameras).unwrap();

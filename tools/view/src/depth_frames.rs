@@ -4,7 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use exr::prelude::{Encoding, Image, Layer, LayerAttributes, SpecificChannels, Vec2, WritableImage};
+use exr::prelude::{
+    Encoding, Image, Layer, LayerAttributes, SpecificChannels, Vec2, WritableImage,
+};
 
 /// The file of a frame.
 pub(crate) fn file(folder: &Path, index: u32) -> PathBuf {
@@ -13,7 +15,11 @@ pub(crate) fn file(folder: &Path, index: u32) -> PathBuf {
 
 /// Metres along the view axis from what a depth buffer with reversed Z and an infinite far plane holds: `near / z`.
 pub(crate) fn metres(reversed_z: f32, near: f32) -> f32 {
-    if reversed_z > 0.0 { near / reversed_z } else { f32::INFINITY }
+    if reversed_z > 0.0 {
+        near / reversed_z
+    } else {
+        f32::INFINITY
+    }
 }
 
 /// Writes the metres of a frame, row by row from the top.
@@ -23,7 +29,12 @@ pub(crate) fn write(file: &Path, [width, height]: [u32; 2], metres: &[f32]) -> R
         .with_channel("Z")
         .with_pixel_fn(|Vec2(x, y)| (metres[y * width + x],));
     let attributes = LayerAttributes::named("depth");
-    let layer = Layer::new((width, height), attributes, Encoding::FAST_LOSSLESS, channels);
+    let layer = Layer::new(
+        (width, height),
+        attributes,
+        Encoding::FAST_LOSSLESS,
+        channels,
+    );
     Image::from_layer(layer)
         .write()
         .to_file(file)
@@ -48,8 +59,15 @@ mod tests {
         let path = std::env::temp_dir().join(format!("drumlin-depth-{}.exr", std::process::id()));
         let depths = [1.5, f32::INFINITY, 1.0e-30, 7.0e8, 3.0, 4.0];
         write(&path, [3, 2], &depths).unwrap();
-        let reader = read().no_deep_data().largest_resolution_level().all_channels();
-        let image = reader.first_valid_layer().all_attributes().from_file(&path).unwrap();
+        let reader = read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels();
+        let image = reader
+            .first_valid_layer()
+            .all_attributes()
+            .from_file(&path)
+            .unwrap();
         let channel = &image.layer_data.channel_data.list[0];
         assert_eq!(channel.name.to_string(), "Z");
         match &channel.sample_data {

@@ -45,7 +45,8 @@ impl FrameWriter {
     /// Starts the thread for a flight of so many frames.
     pub(crate) fn start(wanted: Wanted, frame_count: u32) -> Result<Self> {
         if let Some(folder) = &wanted.frames {
-            std::fs::create_dir_all(folder).with_context(|| format!("{}: making it failed", folder.display()))?;
+            std::fs::create_dir_all(folder)
+                .with_context(|| format!("{}: making it failed", folder.display()))?;
         }
         let (pictures, inbox) = sync_channel(WAITING);
         let thread = std::thread::Builder::new()
@@ -56,14 +57,19 @@ impl FrameWriter {
 
     /// Hands over a frame: RGBA, 8 bits, sRGB, row by row from the top.
     pub(crate) fn write(&self, index: u32, [width, height]: [u32; 2], rgba: Vec<u8>) -> Result<()> {
-        let picture = RgbaImage::from_raw(width, height, rgba).context("a frame of the wrong size")?;
-        self.pictures.send((index, picture)).map_err(|_| anyhow!("writing pictures stopped early"))
+        let picture =
+            RgbaImage::from_raw(width, height, rgba).context("a frame of the wrong size")?;
+        self.pictures
+            .send((index, picture))
+            .map_err(|_| anyhow!("writing pictures stopped early"))
     }
 
     /// Waits until all is written.
     pub(crate) fn finish(self) -> Result<()> {
         drop(self.pictures);
-        self.thread.join().map_err(|_| anyhow!("the picture thread panicked"))?
+        self.thread
+            .join()
+            .map_err(|_| anyhow!("the picture thread panicked"))?
     }
 }
 
@@ -73,8 +79,16 @@ pub(crate) fn write_png(file: &Path, picture: &RgbaImage) -> Result<()> {
         let out = std::io::BufWriter::new(std::fs::File::create(file)?);
         let encoder = PngEncoder::new_with_quality(out, CompressionType::Fast, FilterType::Sub);
         // Opaque pictures need no alpha, and viewers show them alike.
-        let rgb: Vec<u8> = picture.pixels().flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
-        encoder.write_image(&rgb, picture.width(), picture.height(), ExtendedColorType::Rgb8)?;
+        let rgb: Vec<u8> = picture
+            .pixels()
+            .flat_map(|pixel| [pixel[0], pixel[1], pixel[2]])
+            .collect();
+        encoder.write_image(
+            &rgb,
+            picture.width(),
+            picture.height(),
+            ExtendedColorType::Rgb8,
+        )?;
         Ok(())
     };
     write().with_context(|| format!("{}: writing failed", file.display()))
@@ -91,13 +105,18 @@ fn write_all(inbox: &Receiver<(u32, RgbaImage)>, wanted: &Wanted, frame_count: u
             thumbnails.push(thumbnail(&picture));
         }
     }
-    wanted.contact_sheet.as_ref().map_or(Ok(()), |file| write_png(file, &contact_sheet(&thumbnails)))
+    wanted
+        .contact_sheet
+        .as_ref()
+        .map_or(Ok(()), |file| write_png(file, &contact_sheet(&thumbnails)))
 }
 
 /// Frames for the sheet, first and last among them.
 fn chosen(frame_count: u32) -> Vec<u32> {
     let places = (SHEET_COLUMNS * SHEET_ROWS).min(frame_count);
-    (0..places).map(|place| place * (frame_count - 1) / (places - 1).max(1)).collect()
+    (0..places)
+        .map(|place| place * (frame_count - 1) / (places - 1).max(1))
+        .collect()
 }
 
 fn thumbnail(picture: &RgbaImage) -> RgbaImage {
@@ -106,12 +125,17 @@ fn thumbnail(picture: &RgbaImage) -> RgbaImage {
 }
 
 fn contact_sheet(thumbnails: &[RgbaImage]) -> RgbaImage {
-    let [width, height] = thumbnails.first().map_or([1, 1], |first| [first.width(), first.height()]);
+    let [width, height] = thumbnails
+        .first()
+        .map_or([1, 1], |first| [first.width(), first.height()]);
     let count = u32::try_from(thumbnails.len()).unwrap_or(u32::MAX).max(1);
     let columns = count.min(SHEET_COLUMNS);
     let mut sheet = RgbaImage::new(columns * width, count.div_ceil(SHEET_COLUMNS) * height);
     for (place, thumbnail) in (0..count).zip(thumbnails) {
-        let [x, y] = [place % SHEET_COLUMNS * width, place / SHEET_COLUMNS * height];
+        let [x, y] = [
+            place % SHEET_COLUMNS * width,
+            place / SHEET_COLUMNS * height,
+        ];
         imageops::replace(&mut sheet, thumbnail, x.into(), y.into());
     }
     sheet
@@ -133,14 +157,23 @@ mod tests {
     #[test]
     fn frames_and_sheet_are_written() {
         let folder = std::env::temp_dir().join(format!("drumlin-frames-{}", std::process::id()));
-        let wanted = Wanted { frames: Some(folder.clone()), contact_sheet: Some(folder.join("sheet.png")) };
+        let wanted = Wanted {
+            frames: Some(folder.clone()),
+            contact_sheet: Some(folder.join("sheet.png")),
+        };
         let writer = FrameWriter::start(wanted, 5).unwrap();
         for index in 0..5 {
             writer.write(index, [8, 4], vec![40; 8 * 4 * 4]).unwrap();
         }
         writer.finish().unwrap();
-        assert_eq!(image::image_dimensions(folder.join("frame_00004.png")).unwrap(), (8, 4));
-        assert_eq!(image::image_dimensions(folder.join("sheet.png")).unwrap(), (1600, 400));
+        assert_eq!(
+            image::image_dimensions(folder.join("frame_00004.png")).unwrap(),
+            (8, 4)
+        );
+        assert_eq!(
+            image::image_dimensions(folder.join("sheet.png")).unwrap(),
+            (1600, 400)
+        );
         std::fs::remove_dir_all(folder).unwrap();
     }
 }

@@ -48,8 +48,10 @@ struct PathFile {
 impl Path {
     /// Reads a path file for the data set with this frame.
     pub(crate) fn read(file: &FilePath, frame: &WorldFrame) -> Result<Self> {
-        let text = std::fs::read_to_string(file).with_context(|| format!("{}: reading failed", file.display()))?;
-        Self::parse(&text, frame).map_err(|error| error.context(format!("{}: not a path", file.display())))
+        let text = std::fs::read_to_string(file)
+            .with_context(|| format!("{}: reading failed", file.display()))?;
+        Self::parse(&text, frame)
+            .map_err(|error| error.context(format!("{}: not a path", file.display())))
     }
 
     /// Reads the text of a path file.
@@ -66,7 +68,10 @@ impl Path {
         }
         if let Some(index) = keys.windows(2).position(|pair| pair[1].t <= pair[0].t) {
             let (before, after) = (keys[index].t, keys[index + 1].t);
-            bail!("key {}: its t = {after} does not come after t = {before} of the key before", index + 1);
+            bail!(
+                "key {}: its t = {after} does not come after t = {before} of the key before",
+                index + 1
+            );
         }
         let place = |[x, y, z]: [f64; 3]| {
             let [x, y] = frame.to_world([x, y]);
@@ -76,7 +81,10 @@ impl Path {
             let ([a, b, c], [d, e, f]) = (place(key.position), place(key.look_at));
             [a, b, c, d, e, f, key.fov_y]
         });
-        Ok(Self { times: keys.iter().map(|key| key.t).collect(), values: values.collect() })
+        Ok(Self {
+            times: keys.iter().map(|key| key.t).collect(),
+            values: values.collect(),
+        })
     }
 
     /// Seconds from the first key to the last.
@@ -87,7 +95,11 @@ impl Path {
     /// The camera some seconds after the first key; the ends hold.
     pub(crate) fn camera(&self, seconds: f64) -> Camera {
         let [a, b, c, d, e, f, fov_y] = self.value(self.times[0] + seconds);
-        Camera::look_at(DVec3::new(a, b, c), DVec3::new(d, e, f), fov_y.clamp(1.0, 170.0))
+        Camera::look_at(
+            DVec3::new(a, b, c),
+            DVec3::new(d, e, f),
+            fov_y.clamp(1.0, 170.0),
+        )
     }
 
     fn value(&self, t: f64) -> [f64; 7] {
@@ -102,7 +114,10 @@ impl Path {
         let (p, q) = (self.values[before], self.values[after]);
         let (v, w) = (self.tangent(before), self.tangent(after));
         // The cubic Hermite basis.
-        let [h00, h10] = [(1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u), u * (1.0 - u) * (1.0 - u)];
+        let [h00, h10] = [
+            (1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u),
+            u * (1.0 - u) * (1.0 - u),
+        ];
         let [h01, h11] = [u * u * (3.0 - 2.0 * u), u * u * (u - 1.0)];
         std::array::from_fn(|i| h00 * p[i] + h10 * span * v[i] + h01 * q[i] + h11 * span * w[i])
     }
@@ -113,7 +128,10 @@ impl Path {
             return [0.0; 7];
         }
         let [before, here, after] = [key - 1, key, key + 1];
-        let (s, t) = (self.times[here] - self.times[before], self.times[after] - self.times[here]);
+        let (s, t) = (
+            self.times[here] - self.times[before],
+            self.times[after] - self.times[here],
+        );
         let (p, q, r) = (self.values[before], self.values[here], self.values[after]);
         std::array::from_fn(|i| (t * (q[i] - p[i]) / s + s * (r[i] - q[i]) / t) / (s + t))
     }
@@ -121,14 +139,26 @@ impl Path {
 
 /// The text of a path file.
 pub(crate) fn to_json(keys: &[Key]) -> Result<String> {
-    Ok(serde_json::to_string_pretty(&PathFile { keys: keys.to_vec() })?)
+    Ok(serde_json::to_string_pretty(&PathFile {
+        keys: keys.to_vec(),
+    })?)
 }
 
 fn check(key: &Key) -> Result<()> {
     let numbers = [&[key.t, key.fov_y], &key.position[..], &key.look_at[..]].concat();
-    ensure!(numbers.iter().all(|number| number.is_finite()), "a number is not finite");
-    ensure!(key.position != key.look_at, "position and look_at are the same place");
-    ensure!((1.0..=170.0).contains(&key.fov_y), "fov_y is {}, not from 1 to 170 degrees", key.fov_y);
+    ensure!(
+        numbers.iter().all(|number| number.is_finite()),
+        "a number is not finite"
+    );
+    ensure!(
+        key.position != key.look_at,
+        "position and look_at are the same place"
+    );
+    ensure!(
+        (1.0..=170.0).contains(&key.fov_y),
+        "fov_y is {}, not from 1 to 170 degrees",
+        key.fov_y
+    );
     Ok(())
 }
 
@@ -140,10 +170,17 @@ const fn default_fov_y() -> f64 {
 mod tests {
     use super::*;
 
-    const FRAME: WorldFrame = WorldFrame { world_from_crs: [[2.0, 0.0, -10.0], [0.0, 3.0, 1.0]] };
+    const FRAME: WorldFrame = WorldFrame {
+        world_from_crs: [[2.0, 0.0, -10.0], [0.0, 3.0, 1.0]],
+    };
 
     fn key(t: f64, x: f64) -> Key {
-        Key { t, position: [x, 0.0, 5.0], look_at: [x, 10.0, 0.0], fov_y: 40.0 }
+        Key {
+            t,
+            position: [x, 0.0, 5.0],
+            look_at: [x, 10.0, 0.0],
+            fov_y: 40.0,
+        }
     }
 
     #[test]
@@ -157,7 +194,11 @@ mod tests {
 
     #[test]
     fn velocity_is_continuous_at_keys() {
-        let path = Path::new(&[key(0.0, 0.0), key(1.0, 7.0), key(3.0, 4.0), key(3.5, 9.0)], &FRAME).unwrap();
+        let path = Path::new(
+            &[key(0.0, 0.0), key(1.0, 7.0), key(3.0, 4.0), key(3.5, 9.0)],
+            &FRAME,
+        )
+        .unwrap();
         for t in [1.0, 3.0] {
             let h = 1e-6;
             let speed = |a: f64, b: f64| (path.camera(b).eye - path.camera(a).eye) / (b - a);
@@ -181,8 +222,20 @@ mod tests {
         let bad = |keys: &[Key]| format!("{:#}", Path::new(keys, &FRAME).unwrap_err());
         assert!(bad(&[key(1.0, 0.0), key(1.0, 1.0)]).contains("key 1"));
         assert!(bad(&[key(f64::NAN, 0.0)]).contains("finite"));
-        assert!(bad(&[Key { look_at: [0.0, 0.0, 5.0], ..key(0.0, 0.0) }]).contains("same place"));
-        assert!(bad(&[Key { fov_y: 0.0, ..key(0.0, 0.0) }]).contains("fov_y"));
+        assert!(
+            bad(&[Key {
+                look_at: [0.0, 0.0, 5.0],
+                ..key(0.0, 0.0)
+            }])
+            .contains("same place")
+        );
+        assert!(
+            bad(&[Key {
+                fov_y: 0.0,
+                ..key(0.0, 0.0)
+            }])
+            .contains("fov_y")
+        );
     }
 
     #[test]

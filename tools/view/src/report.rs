@@ -89,7 +89,13 @@ impl Report {
             bytes_read: sum(|row| row.bytes_read),
             bytes_uploaded: sum(|row| row.bytes_uploaded),
         };
-        Ok(Self { about, frame_count: frames.len(), summary: summary(&frames)?, total, frames })
+        Ok(Self {
+            about,
+            frame_count: frames.len(),
+            summary: summary(&frames)?,
+            total,
+            frames,
+        })
     }
 
     /// Writes the file.
@@ -115,7 +121,10 @@ impl Report {
             ("tiles_missing", "tiles missing"),
             ("vram_bytes", "VRAM, bytes"),
         ];
-        let head = format!("{:<24}{:>12}{:>12}{:>12}{:>12}\n", "", "p50", "p95", "p99", "max");
+        let head = format!(
+            "{:<24}{:>12}{:>12}{:>12}{:>12}\n",
+            "", "p50", "p95", "p99", "max"
+        );
         head + &rows.into_iter().filter_map(line).collect::<String>()
     }
 }
@@ -128,12 +137,21 @@ impl Spread {
             let rank = (numbers.len() * percent).div_ceil(100).max(1);
             numbers.get(rank - 1).copied()
         };
-        Some(Self { p50: rank(50)?, p95: rank(95)?, p99: rank(99)?, max: rank(100)? })
+        Some(Self {
+            p50: rank(50)?,
+            p95: rank(95)?,
+            p99: rank(99)?,
+            max: rank(100)?,
+        })
     }
 }
 
 fn short(number: f64) -> String {
-    if number.fract() == 0.0 { format!("{number:.0}") } else { format!("{number:.3}") }
+    if number.fract() == 0.0 {
+        format!("{number:.0}")
+    } else {
+        format!("{number:.3}")
+    }
 }
 
 /// The spread of every number of a frame, by its name; parts of parts are named with dots.
@@ -143,18 +161,32 @@ fn summary(frames: &[FrameRow]) -> Result<BTreeMap<String, Spread>> {
         collect("", &serde_json::to_value(frame)?, &mut columns);
     }
     columns.remove("t");
-    let spreads = columns.into_iter().filter_map(|(name, numbers)| Some((name, Spread::new(numbers)?)));
+    let spreads = columns
+        .into_iter()
+        .filter_map(|(name, numbers)| Some((name, Spread::new(numbers)?)));
     Ok(spreads.collect())
 }
 
 fn collect(name: &str, value: &Value, columns: &mut BTreeMap<String, Vec<f64>>) {
-    let inner = |key: &str| if name.is_empty() { key.to_owned() } else { format!("{name}.{key}") };
+    let inner = |key: &str| {
+        if name.is_empty() {
+            key.to_owned()
+        } else {
+            format!("{name}.{key}")
+        }
+    };
     match value {
-        Value::Number(number) => columns.entry(name.to_owned()).or_default().extend(number.as_f64()),
-        Value::Object(parts) => parts.iter().for_each(|(key, part)| collect(&inner(key), part, columns)),
+        Value::Number(number) => columns
+            .entry(name.to_owned())
+            .or_default()
+            .extend(number.as_f64()),
+        Value::Object(parts) => parts
+            .iter()
+            .for_each(|(key, part)| collect(&inner(key), part, columns)),
         Value::Array(parts) => {
             let named = parts.iter().enumerate();
-            named.for_each(|(depth, part)| collect(&inner(&format!("depth{depth}")), part, columns));
+            named
+                .for_each(|(depth, part)| collect(&inner(&format!("depth{depth}")), part, columns));
         }
         _ => {}
     }
@@ -167,14 +199,25 @@ mod tests {
     #[test]
     fn the_spread_is_by_nearest_rank() {
         let spread = Spread::new((1..=200).rev().map(f64::from).collect()).unwrap();
-        assert_eq!(spread, Spread { p50: 100.0, p95: 190.0, p99: 198.0, max: 200.0 });
+        assert_eq!(
+            spread,
+            Spread {
+                p50: 100.0,
+                p95: 190.0,
+                p99: 198.0,
+                max: 200.0
+            }
+        );
         assert_eq!(Spread::new(vec![7.0]).unwrap().p99, 7.0);
         assert_eq!(Spread::new(vec![]), None);
     }
 
     #[test]
     fn every_number_is_summed_up_and_missing_gpu_times_are_not() {
-        let mut row = FrameRow { triangles: 5, ..FrameRow::default() };
+        let mut row = FrameRow {
+            triangles: 5,
+            ..FrameRow::default()
+        };
         row.patches.transition[2] = 9;
         let summary = summary(&[FrameRow::default(), row]).unwrap();
         assert_eq!(summary["triangles"].max, 5.0);
