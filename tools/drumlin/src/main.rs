@@ -8,21 +8,18 @@ mod build;
 mod height;
 mod info;
 mod interrupt;
-mod outcome;
 mod progress;
-mod size;
 mod validate;
 mod viewer;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-
-use crate::outcome::Outcome;
+use drumlin_terminal::{outcome::{EXIT_CODES, Outcome}, usage};
 
 /// Large terrain: builds, inspects, checks and shows pyramids of elevation.
 #[derive(Debug, Parser)]
-#[command(name = "drumlin", version, after_help = outcome::EXIT_CODES, arg_required_else_help = true)]
+#[command(name = "drumlin", version, after_help = EXIT_CODES, arg_required_else_help = true)]
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,
@@ -31,16 +28,16 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Verb {
     /// Builds a pyramid from elevation models
-    #[command(after_help = outcome::EXIT_CODES)]
+    #[command(after_help = EXIT_CODES)]
     Build(build::Arguments),
     /// Says what a pyramid holds
-    #[command(after_help = outcome::EXIT_CODES)]
+    #[command(after_help = EXIT_CODES)]
     Info(info::Arguments),
     /// Checks a pyramid's files
-    #[command(after_help = outcome::EXIT_CODES)]
+    #[command(after_help = EXIT_CODES)]
     Validate(validate::Arguments),
     /// Heights of places, of the surface as stored at the finest level
-    #[command(after_help = outcome::EXIT_CODES)]
+    #[command(after_help = EXIT_CODES)]
     Height(height::Arguments),
     /// Opens a window on a pyramid (`drumlin-view view`)
     #[command(disable_help_flag = true)]
@@ -51,7 +48,11 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse_from(arguments::prepared(std::env::args_os())).verb {
+    let arguments: Arguments = match usage::parse(arguments::prepared(std::env::args_os())) {
+        Ok(arguments) => arguments,
+        Err(code) => return code,
+    };
+    let outcome = match arguments.verb {
         Verb::Build(arguments) => build::run(&arguments),
         Verb::Info(arguments) => info::run(&arguments),
         Verb::Validate(arguments) => validate::run(&arguments),
@@ -59,5 +60,5 @@ fn main() -> ExitCode {
         Verb::View(arguments) => viewer::run("view", &arguments),
         Verb::Fly(arguments) => viewer::run("fly", &arguments),
     };
-    outcome::exit_code(outcome.unwrap_or_else(Outcome::of_error))
+    outcome.unwrap_or_else(|error| Outcome::of_error("drumlin", &error, |_| None)).exit_code()
 }

@@ -5,8 +5,7 @@ use std::{ffi::OsString, path::PathBuf, process::Command};
 
 use anyhow::{Context, Result};
 use clap::Args;
-
-use crate::outcome::Outcome;
+use drumlin_terminal::outcome::Outcome;
 
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {

@@ -3,10 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use drumlin_terminal::{outcome::EXIT_CODES, size};
 use serde::Serialize;
-
-/// Exit codes, as every verb's help says them.
-pub(crate) const EXIT_CODES: &str = "Exit codes: 0 done, 1 invalid data or a failing device, 2 wrong usage, 3 input or output failed";
 
 /// Shows terrain pyramids: a window, or a measured flight without one.
 #[derive(Debug, Parser)]
@@ -53,10 +51,10 @@ pub(crate) struct TerrainArguments {
     #[arg(long)]
     pub(crate) uniform_depth: bool,
     /// Memory for tiles, as 256MiB or 2GB
-    #[arg(long, value_name = "BYTES", default_value = "512MiB", value_parser = parse_bytes)]
+    #[arg(long, value_name = "BYTES", default_value = "512MiB", value_parser = size::parse)]
     pub(crate) ram_budget: u64,
     /// Graphics memory for tiles and everything else the terrain needs there
-    #[arg(long, value_name = "BYTES", default_value = "512MiB", value_parser = parse_bytes)]
+    #[arg(long, value_name = "BYTES", default_value = "512MiB", value_parser = size::parse)]
     pub(crate) vram_budget: u64,
 }
 
@@ -154,39 +152,6 @@ fn number_in(text: &str, least: f64, most: f64) -> Result<f64, String> {
     number.ok_or_else(|| format!("`{text}` is not a number from {least} to {most}"))
 }
 
-/// `1000`, `64MiB`, `2GB`: bare letters and `iB` are powers of 1024, `B` powers of 1000.
-fn parse_bytes(text: &str) -> Result<u64, String> {
-    let end = text
-        .find(|c: char| !c.is_ascii_digit() && c != '.')
-        .unwrap_or(text.len());
-    let (number, suffix) = text.split_at(end);
-    let suffix = suffix.trim().to_ascii_lowercase();
-    let power = suffix
-        .chars()
-        .next()
-        .and_then(|letter| "kmgt".find(letter))
-        .map_or(0, |at| at + 1);
-    let unit: f64 = match &suffix[usize::from(power > 0)..] {
-        "" | "ib" => 1024.0,
-        "b" => 1000.0,
-        _ => {
-            return Err(format!(
-                "`{suffix}` is no unit of memory; there are kB, MB, GB, TB and KiB, MiB, GiB, TiB"
-            ));
-        }
-    };
-    let bytes = (0..power).fold(number.parse().unwrap_or(0.0), |bytes: f64, _| bytes * unit);
-    if !(1.0..=9.0e15).contains(&bytes) {
-        return Err(format!("`{text}` is not from 1 byte to 9000 TB"));
-    }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "checked just above"
-    )]
-    Ok(bytes as u64)
-}
-
 #[cfg(test)]
 mod tests {
     use clap::CommandFactory;
@@ -206,9 +171,6 @@ mod tests {
                 .iter()
                 .all(|text| parse_size(text).is_err())
         );
-        assert_eq!(parse_bytes("64MiB"), Ok(64 << 20));
-        assert_eq!(parse_bytes("2GB"), Ok(2_000_000_000));
-        assert_eq!(parse_bytes("77"), Ok(77));
         assert!(
             ["", "x", "0", "3 miles", "-2"]
                 .iter()

@@ -3,24 +3,39 @@
 /// Reads bytes with an optional suffix: `1000`, `64MiB`, `2GB`, `1.5 GiB`, `512k`.
 ///
 /// `KB`, `MB`, `GB`, `TB` are powers of 1000, `KiB`, `MiB`, `GiB`, `TiB` and the bare letters powers of 1024.
-pub(crate) fn parse(text: &str) -> Result<u64, String> {
+///
+/// # Errors
+///
+/// What is wrong with it.
+pub fn parse(text: &str) -> Result<u64, String> {
     let text = text.trim();
-    let end = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+    let end = text
+        .find(|c: char| !c.is_ascii_digit() && c != '.')
+        .unwrap_or(text.len());
     let (number, suffix) = text.split_at(end);
     let unit = unit(suffix.trim()).ok_or_else(|| {
-        format!("`{suffix}` is no unit of memory; there are B, KB, MB, GB, TB and KiB, MiB, GiB, TiB")
+        format!(
+            "`{suffix}` is no unit of memory; there are B, KB, MB, GB, TB and KiB, MiB, GiB, TiB"
+        )
     })?;
-    let number: f64 = number.parse().map_err(|_| format!("`{text}` does not start with a number"))?;
+    let number: f64 = number
+        .parse()
+        .map_err(|_| format!("`{text}` does not start with a number"))?;
     let bytes = number * unit;
     if !(1.0..=9.0e15).contains(&bytes) {
         return Err(format!("`{text}` is not from 1 byte to 9000 TB"));
     }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just above")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "checked just above"
+    )]
     Ok(bytes as u64)
 }
 
 /// Bytes for people.
-pub(crate) fn display(bytes: u64) -> String {
+#[must_use]
+pub fn display(bytes: u64) -> String {
     #[expect(clippy::cast_precision_loss, reason = "three digits are shown")]
     let mut number = bytes as f64;
     for unit in ["B", "kB", "MB", "GB"] {
@@ -55,19 +70,38 @@ mod tests {
 
     #[test]
     fn units_are_read_as_documented() {
-        for (text, bytes) in
-            [("7", 7), ("64MiB", 64 << 20), ("2GB", 2_000_000_000), ("1.5 GiB", 3 << 29), ("512k", 512 << 10), ("9B", 9)]
-        {
+        for (text, bytes) in [
+            ("7", 7),
+            ("64MiB", 64 << 20),
+            ("2GB", 2_000_000_000),
+            ("1.5 GiB", 3 << 29),
+            ("512k", 512 << 10),
+            ("9B", 9),
+        ] {
             assert_eq!(parse(text), Ok(bytes), "{text}");
         }
-        for text in ["", "MiB", "-1", "1 furlong", "0", "1e9", "99999999TB", "1.2.3"] {
+        for text in [
+            "",
+            "MiB",
+            "-1",
+            "1 furlong",
+            "0",
+            "1e9",
+            "99999999TB",
+            "1.2.3",
+        ] {
             assert!(parse(text).is_err(), "{text}");
         }
     }
 
     #[test]
     fn bytes_are_shown_with_three_digits() {
-        for (bytes, text) in [(999, "999 B"), (1500, "1.5 kB"), (9_012_345, "9.0 MB"), (123_456_789, "123 MB")] {
+        for (bytes, text) in [
+            (999, "999 B"),
+            (1500, "1.5 kB"),
+            (9_012_345, "9.0 MB"),
+            (123_456_789, "123 MB"),
+        ] {
             assert_eq!(display(bytes), text);
         }
     }
