@@ -23,7 +23,12 @@ pub(crate) fn prepared(typed: impl Iterator<Item = OsString>) -> Vec<OsString> {
 /// Reads `X,Y`.
 pub(crate) fn coordinates(text: &str) -> Option<[f64; 2]> {
     let (x, y) = text.split_once(',')?;
-    let number = |text: &str| text.trim().parse().ok().filter(|number: &f64| number.is_finite());
+    let number = |text: &str| {
+        text.trim()
+            .parse()
+            .ok()
+            .filter(|number: &f64| number.is_finite())
+    };
     Some([number(x)?, number(y)?])
 }
 
@@ -33,19 +38,37 @@ mod tests {
 
     fn prepare(line: &str) -> String {
         let words = prepared(line.split(' ').map(OsString::from));
-        words.iter().map(|word| word.to_str().unwrap()).collect::<Vec<_>>().join(" ")
+        words
+            .iter()
+            .map(|word| word.to_str().unwrap())
+            .collect::<Vec<_>>()
+            .join(" ")
     }
 
     #[test]
     fn coordinates_may_be_negative_and_many_and_anywhere() {
-        assert_eq!(prepare("drumlin height --at -1,2 out.zarr"), "drumlin height --at=-1,2 out.zarr");
-        assert_eq!(prepare("drumlin height a --at 1,2 -3,4 --json"), "drumlin height a --at=1,2 --at=-3,4 --json");
-        assert_eq!(prepare("drumlin height a --at=-1,2 --at -.5,4"), "drumlin height a --at=-1,2 --at=-.5,4");
+        assert_eq!(
+            prepare("drumlin height --at -1,2 out.zarr"),
+            "drumlin height --at=-1,2 out.zarr"
+        );
+        assert_eq!(
+            prepare("drumlin height a --at 1,2 -3,4 --json"),
+            "drumlin height a --at=1,2 --at=-3,4 --json"
+        );
+        assert_eq!(
+            prepare("drumlin height a --at=-1,2 --at -.5,4"),
+            "drumlin height a --at=-1,2 --at=-.5,4"
+        );
     }
 
     #[test]
     fn other_words_stay() {
-        for line in ["drumlin build 1,2 -o x", "drumlin height --at a,b", "drumlin", "drumlin height --at 1,nan"] {
+        for line in [
+            "drumlin build 1,2 -o x",
+            "drumlin height --at a,b",
+            "drumlin",
+            "drumlin height --at 1,nan",
+        ] {
             assert_eq!(prepare(line), line);
         }
     }

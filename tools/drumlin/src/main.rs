@@ -9,13 +9,17 @@ mod height;
 mod info;
 mod interrupt;
 mod progress;
+mod sources;
 mod validate;
 mod viewer;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use drumlin_terminal::{outcome::{EXIT_CODES, Outcome}, usage};
+use drumlin_terminal::{
+    outcome::{EXIT_CODES, Outcome},
+    usage,
+};
 
 /// Large terrain: builds, inspects, checks and shows pyramids of elevation.
 #[derive(Debug, Parser)]
@@ -60,5 +64,7 @@ fn main() -> ExitCode {
         Verb::View(arguments) => viewer::run("view", &arguments),
         Verb::Fly(arguments) => viewer::run("fly", &arguments),
     };
-    outcome.unwrap_or_else(|error| Outcome::of_error("drumlin", &error, |_| None)).exit_code()
+    outcome
+        .unwrap_or_else(|error| Outcome::of_error("drumlin", &error, |_| None))
+        .exit_code()
 }

@@ -10,7 +10,11 @@ use drumlin_terminal::outcome::Outcome;
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// Handed over as they are
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENTS")]
+    #[arg(
+        trailing_var_arg = true,
+        allow_hyphen_values = true,
+        value_name = "ARGUMENTS"
+    )]
     rest: Vec<OsString>,
 }
 
@@ -20,7 +24,9 @@ pub(crate) fn run(verb: &str, arguments: &Arguments) -> Result<Outcome> {
     command.arg(verb).args(&arguments.rest);
     let missing = || {
         let file = program.display();
-        format!("{file}: cannot be run; `{verb}` lives in drumlin-view, which belongs beside drumlin")
+        format!(
+            "{file}: cannot be run; `{verb}` lives in drumlin-view, which belongs beside drumlin"
+        )
     };
     let status = hand_over(&mut command).with_context(missing)?;
     Ok(Outcome::Code(status))

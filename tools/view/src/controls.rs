@@ -32,7 +32,14 @@ impl Controls {
     pub(crate) fn new(size: f64) -> Self {
         let size = size.max(1.0);
         let (forward, right, up) = ([false; 2], [false; 2], [false; 2]);
-        Self { speed: 0.03 * size, range: [1e-5 * size, size], forward, right, up, hurry: false }
+        Self {
+            speed: 0.03 * size,
+            range: [1e-5 * size, size],
+            forward,
+            right,
+            up,
+            hurry: false,
+        }
     }
 
     /// A key goes down or up. False when it is none of ours.
@@ -52,7 +59,8 @@ impl Controls {
 
     /// All keys up, as when the window loses the keyboard.
     pub(crate) fn release(&mut self) {
-        (self.forward, self.right, self.up, self.hurry) = ([false; 2], [false; 2], [false; 2], false);
+        (self.forward, self.right, self.up, self.hurry) =
+            ([false; 2], [false; 2], [false; 2], false);
     }
 
     /// The wheel turned by notches, away from the user positive.
@@ -66,15 +74,24 @@ impl Controls {
         // A narrow view turns slower, so that what is dragged stays under the mouse.
         let scale = LOOK * camera.fov_y_degrees / 60.0;
         let pitch = (pitch - y * scale).clamp(-STEEPEST, STEEPEST);
-        Camera::from_angles(camera.eye, [heading + x * scale, pitch], camera.fov_y_degrees)
+        Camera::from_angles(
+            camera.eye,
+            [heading + x * scale, pitch],
+            camera.fov_y_degrees,
+        )
     }
 
     /// Some seconds later.
     pub(crate) fn step(&self, camera: &Camera, seconds: f64) -> Camera {
         let axis = |[plus, minus]: [bool; 2]| f64::from(i8::from(plus) - i8::from(minus));
-        let way = camera.forward * axis(self.forward) + camera.right * axis(self.right) + DVec3::Z * axis(self.up);
+        let way = camera.forward * axis(self.forward)
+            + camera.right * axis(self.right)
+            + DVec3::Z * axis(self.up);
         let hurry = if self.hurry { HURRY } else { 1.0 };
-        Camera { eye: camera.eye + way * self.speed * hurry * seconds, ..*camera }
+        Camera {
+            eye: camera.eye + way * self.speed * hurry * seconds,
+            ..*camera
+        }
     }
 
     /// Metres a second.
@@ -96,11 +113,17 @@ mod tests {
         let mut controls = Controls::new(1000.0);
         controls.key(KeyCode::KeyW, true);
         controls.key(KeyCode::KeyD, true);
-        assert_eq!(controls.step(&north(), 2.0).eye, DVec3::new(60.0, 60.0, 0.0));
+        assert_eq!(
+            controls.step(&north(), 2.0).eye,
+            DVec3::new(60.0, 60.0, 0.0)
+        );
         controls.key(KeyCode::KeyS, true);
         controls.key(KeyCode::KeyD, false);
         controls.key(KeyCode::KeyQ, true);
-        assert_eq!(controls.step(&north(), 1.0).eye, DVec3::new(0.0, 0.0, -30.0));
+        assert_eq!(
+            controls.step(&north(), 1.0).eye,
+            DVec3::new(0.0, 0.0, -30.0)
+        );
         controls.release();
         assert_eq!(controls.step(&north(), 1.0), north());
         assert!(!controls.key(KeyCode::KeyP, true));
