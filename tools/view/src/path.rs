@@ -46,33 +46,9 @@ struct PathFile {
 }
 
 impl Path {
-    /// Reads a path file for the data set with this frame.
-    pub(crate) fn read(file: &FilePath, frame: &WorldFrame) -> Result<Self> {
-        let text = std::fs::read_to_string(file)
-            .with_context(|| format!("{}: reading failed", file.display()))?;
-        Self::parse(&text, frame)
-            .map_err(|error| error.context(format!("{}: not a path", file.display())))
-    }
-
-    /// Reads the text of a path file.
-    pub(crate) fn parse(text: &str, frame: &WorldFrame) -> Result<Self> {
-        let file: PathFile = serde_json::from_str(text)?;
-        Self::new(&file.keys, frame)
-    }
-
     /// Checks keys and lays them out in the world.
     pub(crate) fn new(keys: &[Key], frame: &WorldFrame) -> Result<Self> {
-        ensure!(!keys.is_empty(), "it has no keys; at least one is needed");
-        for (index, key) in keys.iter().enumerate() {
-            check(key).with_context(|| format!("key {index}"))?;
-        }
-        if let Some(index) = keys.windows(2).position(|pair| pair[1].t <= pair[0].t) {
-            let (before, after) = (keys[index].t, keys[index + 1].t);
-            bail!(
-                "key {}: its t = {after} does not come after t = {before} of the key before",
-                index + 1
-            );
-        }
+        check_all(keys)?;
         let place = |[x, y, z]: [f64; 3]| {
             let [x, y] = frame.to_world([x, y]);
             [x, y, z]
@@ -137,11 +113,38 @@ impl Path {
     }
 }
 
+/// Reads the keys of a path file.
+pub(crate) fn read(file: &FilePath) -> Result<Vec<Key>> {
+    let text = std::fs::read_to_string(file).with_context(|| format!("{}: reading failed", file.display()))?;
+    parse(&text).with_context(|| format!("{}: not a path", file.display()))
+}
+
+fn parse(text: &str) -> Result<Vec<Key>> {
+    let file: PathFile = serde_json::from_str(text)?;
+    check_all(&file.keys)?;
+    Ok(file.keys)
+}
+
 /// The text of a path file.
 pub(crate) fn to_json(keys: &[Key]) -> Result<String> {
     Ok(serde_json::to_string_pretty(&PathFile {
         keys: keys.to_vec(),
     })?)
+}
+
+fn check_all(keys: &[Key]) -> Result<()> {
+    ensure!(!keys.is_empty(), "it has no keys; at least one is needed");
+    for (index, key) in keys.iter().enumerate() {
+        check(key).with_context(|| format!("key {index}"))?;
+    }
+    if let Some(index) = keys.windows(2).position(|pair| pair[1].t <= pair[0].t) {
+        let (before, after) = (keys[index].t, keys[index + 1].t);
+        bail!(
+            "key {}: its t = {after} does not come after t = {before} of the key before",
+            index + 1
+        );
+    }
+    Ok(())
 }
 
 fn check(key: &Key) -> Result<()> {
@@ -215,7 +218,7 @@ mod tests {
 
     #[test]
     fn bad_paths_are_one_clear_error() {
-        let text = |text: &str| format!("{:#}", Path::parse(text, &FRAME).unwrap_err());
+        let text = |text: &str| format!("{:#}", parse(text).unwrap_err());
         assert!(text("{\"keys\": []}").contains("no keys"));
         assert!(text("{}").contains("keys"));
         assert!(text("keys").contains("line 1"));
