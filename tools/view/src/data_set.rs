@@ -25,8 +25,15 @@ pub(crate) struct DataSet {
 
 impl DataSet {
     pub(crate) fn open(folder: &FilePath) -> Result<Self> {
-        let name = folder.file_name().unwrap_or(folder.as_os_str()).to_string_lossy().into_owned();
-        Ok(Self { pyramid: Arc::new(Pyramid::open(folder)?), name })
+        let name = folder
+            .file_name()
+            .unwrap_or(folder.as_os_str())
+            .to_string_lossy()
+            .into_owned();
+        Ok(Self {
+            pyramid: Arc::new(Pyramid::open(folder)?),
+            name,
+        })
     }
 
     pub(crate) fn metadata(&self) -> &Metadata {
@@ -50,7 +57,9 @@ impl DataSet {
             Some(file) => path::read(file),
             None => {
                 let ground = Ground::read(&self.pyramid)?;
-                auto_path(&self.metadata().grid.extent(), &self.frame(), &|place| ground.height(place))
+                auto_path(&self.metadata().grid.extent(), &self.frame(), &|place| {
+                    ground.height(place)
+                })
             }
         }
     }
@@ -85,12 +94,18 @@ impl<'a> Ground<'a> {
         let level = metadata.finest().min(GROUND_LEVEL);
         let [rows, columns] = metadata.grid.tiles(level);
         let read = |index: u32| -> Result<Vec<f64>> {
-            let tile = pyramid.read_tile_chain(TileId::new(level, index / columns, index % columns))?;
+            let tile =
+                pyramid.read_tile_chain(TileId::new(level, index / columns, index % columns))?;
             let heights = surface::decode_heights(&tile.controls, &tile.detail, tile.step);
-            let metres = |height: i32| f64::from(height) * metadata.unit() + f64::from(tile.summary.error);
+            let metres =
+                |height: i32| f64::from(height) * metadata.unit() + f64::from(tile.summary.error);
             Ok(heights.into_iter().map(metres).collect())
         };
-        Ok(Self { metadata, level, tiles: (0..rows * columns).map(read).collect::<Result<_>>()? })
+        Ok(Self {
+            metadata,
+            level,
+            tiles: (0..rows * columns).map(read).collect::<Result<_>>()?,
+        })
     }
 
     /// The highest corner of the cell at CRS coordinates; none outside.
@@ -101,7 +116,8 @@ impl<'a> Ground<'a> {
         }
         let place = grid.at_level(self.level).row_column(place);
         let [tile_rows, tile_columns] = grid.tiles(self.level).map(|count| count as usize);
-        let [(tile_row, row), (tile_column, column)] = [(place[0], tile_rows), (place[1], tile_columns)].map(cell);
+        let [(tile_row, row), (tile_column, column)] =
+            [(place[0], tile_rows), (place[1], tile_columns)].map(cell);
         let heights = &self.tiles[tile_row * tile_columns + tile_column];
         let corner = row * TILE_SAMPLES + column;
         let corners = [0, 1, TILE_SAMPLES, TILE_SAMPLES + 1].map(|step| heights[corner + step]);
@@ -110,7 +126,10 @@ impl<'a> Ground<'a> {
 }
 
 /// The tile and the cell in it of a row or column with a fraction.
-#[expect(clippy::cast_possible_truncation, reason = "clamped to the level's cells")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "clamped to the level's cells"
+)]
 fn cell((at, tiles): (f64, usize)) -> (usize, usize) {
     let cell = (at.max(0.0) as usize).min(tiles * TILE_CELLS - 1);
     (cell / TILE_CELLS, cell % TILE_CELLS)
