@@ -28,6 +28,17 @@ impl BitGrid {
         self.words[row * self.words_per_row + column / 64] |= 1 << (column % 64);
     }
 
+    /// True when any of the columns `first` … `last` of a row is set.
+    pub(super) fn any_in(&self, row: usize, first: usize, last: usize) -> bool {
+        let words = &self.words[row * self.words_per_row..][..self.words_per_row];
+        let (from, to) = (first / 64, last / 64);
+        let (head, tail) = (u64::MAX << (first % 64), u64::MAX >> (63 - last % 64));
+        if from == to {
+            return words[from] & head & tail != 0;
+        }
+        words[from] & head != 0 || words[to] & tail != 0 || words[from + 1..to].iter().any(|word| *word != 0)
+    }
+
     pub(super) fn count(&self) -> u64 {
         self.words.iter().map(|word| u64::from(word.count_ones())).sum()
     }
