@@ -4,8 +4,8 @@
 use rayon::prelude::*;
 
 use crate::geo::{CAGE_CONTROL_COUNT, CAGE_CONTROLS, TILE_QUADS};
-use crate::pyramid::PyramidError;
 use crate::pyramid::surface::CONTROL_LIMIT;
+use crate::pyramid::{PyramidError, number_bytes};
 
 /// Every fourth level stores its controls whole.
 const KEY_PERIOD: u8 = 4;
@@ -64,33 +64,34 @@ pub(super) fn is_key(level: u8) -> bool {
 }
 
 /// Makes a fitted cage the one a decoder will see: prediction + q r, or on a key level (no parent given) whole steps.
-/// Returns the greatest stored number's size.
+/// Returns how many bytes the widest stored number takes.
 ///
 /// # Errors
 /// [`PyramidError::Refused`] where a control leaves the range of the 32-bit rule.
-pub(super) fn quantise(cage: &mut LevelCage, parent: Option<&LevelCage>, step: i32) -> Result<u32, PyramidError> {
+pub(super) fn quantise(cage: &mut LevelCage, parent: Option<&LevelCage>, step: i32) -> Result<u8, PyramidError> {
     let columns = cage.columns;
-    let greatest = cage.controls.par_chunks_exact_mut(columns).enumerate().map(|(row, line)| {
+    let lines = cage.controls.par_chunks_exact_mut(columns).enumerate().map(|(row, line)| {
         let mut predicted = vec![0; columns];
         if let Some(parent) = parent {
             parent.predict_row(row, &mut predicted);
         }
-        let mut greatest = [0; 2];
+        let (mut width, mut greatest) = (1, 0);
         for (control, predicted) in line.iter_mut().zip(predicted) {
             let code = nearest(*control - predicted, step);
             *control = predicted + code * step;
             let stored = if parent.is_some() { code } else { *control };
-            greatest = [greatest[0].max(stored.unsigned_abs()), greatest[1].max(control.unsigned_abs())];
+            width = width.max(number_bytes(stored));
+            greatest = greatest.max(control.unsigned_abs());
         }
-        greatest
+        (width, greatest)
     });
-    let [stored, control] = greatest.reduce(|| [0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
+    let (width, control) = lines.reduce(|| (1, 0), |a, b| (a.0.max(b.0), a.1.max(b.1)));
     if control >= CONTROL_LIMIT.unsigned_abs() {
         return Err(PyramidError::Refused(format!(
             "a cage's control of {control} units is over the limit of 2^25; a greater error bound or unit allows it"
         )));
     }
-    Ok(stored)
+    Ok(width)
 }
 
 /// `difference / step` rounded to nearest.

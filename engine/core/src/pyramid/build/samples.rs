@@ -136,6 +136,12 @@ impl LevelSamples {
         any.then_some(bits)
     }
 
+    /// How many of the first rows' and columns' samples are void.
+    pub(super) fn void_count(&self, [rows, columns]: [usize; 2]) -> u64 {
+        let Some(voids) = &self.voids else { return 0 };
+        (0..rows).map(|row| (0..columns).filter(|column| voids.get(row, *column)).count() as u64).sum()
+    }
+
     /// Remembers which samples hold `sentinel` as void and makes them 0.
     pub(super) fn take_voids(&mut self, sentinel: i32) {
         if self.values.par_iter().all(|value| *value != sentinel) {
