@@ -6,13 +6,24 @@
 //! looks at what a file holds rather than at its name. Row 0 is north and column 0 is west whatever the file says;
 //! void is NaN; whole numbers of metres come out exactly.
 
+mod bytes;
+mod cache;
 mod error;
 mod header;
 mod image;
 mod mosaic;
+mod placement;
+mod samples;
+#[cfg(test)]
+mod tests;
+mod tiff;
+mod units;
+mod world_file;
 
 use std::path::Path;
 
+use self::bytes::Bytes;
+use self::tiff::{Ifd, Tiff};
 pub use error::DemError;
 pub use header::{OpenOptions, RasterHeader, SourceInfo, Window};
 pub use image::{Image, open_image};
@@ -36,6 +47,10 @@ pub trait Raster: Send + Sync {
 /// # Errors
 /// [`DemError`], naming the file, the place in it and the limit.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Raster>, DemError> {
-    let _ = options;
+    let bytes = Bytes::open(path)?;
+    let head = bytes.head(64)?;
+    if Ifd::matches(&head) {
+        return Ok(Box::new(Tiff::open(bytes, options)?));
+    }
     Err(DemError::format(path, "no known elevation format"))
 }
