@@ -9,10 +9,15 @@
 mod bytes;
 mod cache;
 mod error;
+mod exr;
 mod header;
+mod hgt;
 mod image;
+mod memory;
 mod mosaic;
 mod placement;
+mod plain;
+mod png;
 mod samples;
 #[cfg(test)]
 mod tests;
@@ -52,5 +57,15 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Raster>, DemEr
     if Ifd::matches(&head) {
         return Ok(Box::new(Tiff::open(bytes, options)?));
     }
-    Err(DemError::format(path, "no known elevation format"))
+    if png::matches(&head) {
+        return png::open(&bytes, options);
+    }
+    if exr::matches(&head) {
+        return exr::open(&bytes, options);
+    }
+    // An SRTM tile has nothing but its name and length to be told by.
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hgt")) {
+        return hgt::open(bytes, options);
+    }
+    Err(DemError::format(path, "not an elevation model: neither GeoTIFF, PNG, EXR nor SRTM (.hgt)"))
 }

@@ -75,18 +75,27 @@ impl Flip {
 
     /// Turns the samples of a stored window, in place.
     pub(super) fn turn(self, window: Window, samples: &mut [f64]) {
-        let columns = window.columns as usize;
-        match (self.rows, self.columns) {
-            (true, true) => samples.reverse(),
-            (true, false) => {
-                let rows = window.rows as usize;
-                for row in 0..rows / 2 {
-                    let (north, south) = samples.split_at_mut((rows - 1 - row) * columns);
-                    north[row * columns..][..columns].swap_with_slice(&mut south[..columns]);
-                }
+        self.turn_rows(window.columns as usize, samples);
+    }
+
+    /// Turns an image's pixels, in place.
+    pub(super) fn turn_pixels(self, width: u32, pixels: &mut [[u8; 3]]) {
+        self.turn_rows(width as usize, pixels);
+    }
+
+    fn turn_rows<T>(self, columns: usize, samples: &mut [T]) {
+        if self.columns {
+            samples.chunks_exact_mut(columns.max(1)).for_each(<[T]>::reverse);
+        }
+        if self.rows && columns > 0 {
+            let mut rest = samples;
+            // The northmost and southmost row left change places.
+            while rest.len() >= 2 * columns {
+                let (north, after) = rest.split_at_mut(columns);
+                let (middle, south) = after.split_at_mut(after.len() - columns);
+                north.swap_with_slice(south);
+                rest = middle;
             }
-            (false, true) => samples.chunks_exact_mut(columns.max(1)).for_each(<[f64]>::reverse),
-            (false, false) => {}
         }
     }
 }
