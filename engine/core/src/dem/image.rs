@@ -7,12 +7,12 @@ use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, gues
 
 use super::DemError;
 use super::bytes::Bytes;
-use super::tiff::{Georef, Ifd};
+use super::tiff::{Georef, Ifd, read_picture};
 use super::world_file;
 use crate::geo::{Crs, Extent};
 
 /// The most pixels along one side of an image.
-const MAX_SIDE: u32 = 1 << 17;
+const MAX_SIDE: u64 = 1 << 17;
 /// The most bytes of an image file, and of its decoded pixels.
 const MAX_BYTES: u64 = 1 << 31;
 /// The most bytes that one stored byte can become in the formats read.
@@ -45,14 +45,13 @@ pub fn open_image(path: &Path) -> Result<Image, DemError> {
         _ if Ifd::matches(&bytes.head(8)?) => ImageFormat::Tiff,
         _ => return Err(DemError::format(path, "not an image: neither PNG nor JPEG nor TIFF")),
     };
-    let georef = if format == ImageFormat::Tiff {
-        Georef::read(&bytes, &Ifd::read(&bytes)?)?
+    let (georef, (width, height, mut rgb)) = if format == ImageFormat::Tiff {
+        let ifd = Ifd::read(&bytes)?;
+        (Georef::read(&bytes, &ifd)?, read_picture(&bytes, &ifd)?)
     } else {
-        Georef { placement: world_file::find(path)?, crs: Crs::unknown(), vertical_unit: None }
+        let placement = world_file::find(path)?;
+        (Georef { placement, crs: Crs::unknown(), vertical_unit: None }, decode(&bytes, format)?)
     };
-    let pixels = decode(&bytes, format)?.into_rgb8();
-    let (width, height) = pixels.dimensions();
-    let mut rgb = pixels.into_raw().as_chunks().0.to_vec();
     let mut extent = None;
     if let Some(placement) = georef.placement {
         let (grid, flip) = placement.grid(path, width, height)?;
@@ -67,21 +66,27 @@ pub fn open_image(path: &Path) -> Result<Image, DemError> {
     Ok(Image { width, height, rgb, extent, crs: georef.crs })
 }
 
-fn decode(bytes: &Bytes, format: ImageFormat) -> Result<DynamicImage, DemError> {
+/// Width, height and pixels of a PNG or JPEG.
+fn decode(bytes: &Bytes, format: ImageFormat) -> Result<(u32, u32, Vec<[u8; 3]>), DemError> {
     let damaged = |error: ::image::ImageError| DemError::format(bytes.path(), error.to_string());
     let mut reader = ImageReader::with_format(Cursor::new(bytes.whole(MAX_BYTES)?), format);
     let mut limits = Limits::default();
-    limits.max_image_width = Some(MAX_SIDE);
-    limits.max_image_height = Some(MAX_SIDE);
     limits.max_alloc = Some(MAX_BYTES);
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(damaged)?;
     let (width, height) = decoder.dimensions();
-    if width > MAX_SIDE || height > MAX_SIDE {
+    check_size(bytes, width.into(), height.into())?;
+    let pixels = DynamicImage::from_decoder(decoder).map_err(damaged)?.into_rgb8();
+    Ok((width, height, pixels.into_raw().as_chunks().0.to_vec()))
+}
+
+/// Refuses images that are too large, or larger than their file can be, before memory is taken.
+pub(super) fn check_size(bytes: &Bytes, width: u64, height: u64) -> Result<(), DemError> {
+    if width.max(height) > MAX_SIDE {
         let what = format!("an image of {width} x {height} pixels");
         return Err(DemError::limit(bytes.path(), what, format!("{MAX_SIDE} pixels a side")));
     }
-    let size = decoder.total_bytes().max(u64::from(width) * u64::from(height) * 3);
+    let size = width * height * 3;
     if size > MAX_BYTES {
         let what = format!("an image of {width} x {height} pixels, {size} bytes,");
         return Err(DemError::limit(bytes.path(), what, format!("{MAX_BYTES} bytes")));
@@ -90,5 +95,5 @@ fn decode(bytes: &Bytes, format: ImageFormat) -> Result<DynamicImage, DemError> 
         let what = format!("{} bytes cannot hold {width} x {height} pixels", bytes.len());
         return Err(DemError::format(bytes.path(), what));
     }
-    DynamicImage::from_decoder(decoder).map_err(damaged)
+    Ok(())
 }

@@ -5,6 +5,7 @@ mod geokeys;
 mod georef;
 mod ifd;
 mod metadata;
+mod picture;
 mod table;
 
 use self::chunk::Coding;
@@ -12,11 +13,12 @@ pub(super) use self::georef::Georef;
 pub(super) use self::ifd::Ifd;
 use self::ifd::tag;
 use self::metadata::BandMetadata;
+pub(super) use self::picture::read_picture;
 use self::table::Table;
 use super::bytes::Bytes;
 use super::cache::Cache;
 use super::placement::{Flip, Placement};
-use super::samples::{Samples, Scaling};
+use super::samples::Scaling;
 use super::{DemError, OpenOptions, Raster, RasterHeader, Window};
 
 /// Void in 16-bit models that declare none: no place known lies so deep.
@@ -38,7 +40,7 @@ impl Tiff {
     pub(super) fn open(bytes: Bytes, options: &OpenOptions) -> Result<Self, DemError> {
         let ifd = Ifd::read(&bytes)?;
         let coding = read_coding(&bytes, &ifd)?;
-        let table = Table::read(&bytes, &ifd, &coding)?;
+        let table = Table::read(&bytes, &ifd, &coding, 1)?;
         let georef = Georef::read(&bytes, &ifd)?;
         let scaling = read_scaling(&bytes, &ifd, &coding, georef.vertical_unit, options)?;
         let placement = georef.placement.unwrap_or(Placement::unknown(options));
@@ -53,25 +55,13 @@ impl Tiff {
         Ok(Self { header, bytes, coding, table, scaling, flip, cache: Cache::new(options.cache_bytes()) })
     }
 
-    /// The numbers of a strip or tile that the file holds.
-    fn decode(&self, index: usize, (offset, count): (u64, u64)) -> Result<Samples, DemError> {
-        let Table { name, chunk_columns: columns, .. } = self.table;
-        let rows = self.table.stored_rows(index);
-        let damaged = |what: String| DemError::format(self.bytes.path(), format!("{name} {index}: {what}"));
-        if !self.coding.is_plausible(count, u64::from(rows) * u64::from(columns)) {
-            return Err(damaged(format!("{count} bytes cannot hold {rows} x {columns} samples")));
-        }
-        let stored = self.bytes.read(offset, count, || format!("{name} {index}"))?;
-        self.coding.decode(stored, rows, columns).map_err(damaged)
-    }
-
     /// Copies what one strip or tile has of a stored window.
     fn copy(&self, chunk: [u32; 2], window: Window, out: &mut [f64]) -> Result<(), DemError> {
         let [chunk_row, chunk_column] = chunk;
         let (rows, columns) = (self.table.chunk_rows, self.table.chunk_columns);
         let index = chunk_row as usize * self.table.across() as usize + chunk_column as usize;
         let part = match self.table.place(index) {
-            Some(place) => Some(self.cache.get(index, || self.decode(index, place))?),
+            Some(place) => Some(self.cache.get(index, || self.table.decode(&self.bytes, &self.coding, index, place))?),
             None => None,
         };
         let first = [u64::from(chunk_row) * u64::from(rows), u64::from(chunk_column) * u64::from(columns)];
@@ -127,36 +117,17 @@ fn to_usize(number: u64) -> usize {
     usize::try_from(number).unwrap_or(usize::MAX)
 }
 
+/// The coding of an elevation model, or why there are no heights to read.
 fn read_coding(bytes: &Bytes, ifd: &Ifd) -> Result<Coding, DemError> {
-    let number = |tag: u16, default: u64| -> Result<u16, DemError> {
-        let value = ifd.number(bytes, tag)?.unwrap_or(default);
-        u16::try_from(value).map_err(|_| DemError::format(bytes.path(), format!("{value} in tag {tag}")))
-    };
-    let bands = number(tag::SAMPLES, 1)?;
+    let bands = ifd.short(bytes, tag::SAMPLES, 1)?;
     if bands != 1 {
         let what = format!("{bands} bands (tag 277); an elevation model has one");
         return Err(DemError::unsupported(bytes.path(), what));
     }
-    if number(tag::PHOTOMETRIC, 1)? == 3 {
+    if ifd.short(bytes, tag::PHOTOMETRIC, 1)? == 3 {
         return Err(DemError::unsupported(bytes.path(), "palette colours (tag 262); heights are needed"));
     }
-    if number(tag::FILL_ORDER, 1)? != 1 {
-        return Err(DemError::unsupported(bytes.path(), "reversed bits (tag 266)"));
-    }
-    let compression = number(tag::COMPRESSION, 1)?;
-    // Only these have a predictor; writers leave the tag in other files, and readers pass over it.
-    let predicted = !matches!(compression, 1 | 32773);
-    let coding = Coding {
-        big_endian: ifd.big_endian,
-        compression,
-        predictor: if predicted { number(tag::PREDICTOR, 1)? } else { 1 },
-        bits: number(tag::BITS, 1)?,
-        // Format 4 is "undefined"; everyone reads it as unsigned.
-        format: match number(tag::SAMPLE_FORMAT, 1)? {
-            4 => 1,
-            format => format,
-        },
-    };
+    let coding = Coding::read(bytes, ifd, 1)?;
     match coding.unsupported() {
         Some(what) => Err(DemError::unsupported(bytes.path(), what)),
         None => Ok(coding),

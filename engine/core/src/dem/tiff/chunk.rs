@@ -11,6 +11,8 @@ use ::tiff::{
 };
 
 use super::super::samples::{SampleType, Samples};
+use super::super::{DemError, bytes::Bytes};
+use super::ifd::{Ifd, tag};
 
 /// How the numbers of strips and tiles are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,9 +25,12 @@ pub(super) struct Coding {
     pub(super) bits: u16,
     /// 1 unsigned, 2 signed, 3 floating point.
     pub(super) format: u16,
+    /// Numbers of one sample that lie together: 1, or the bands of an image.
+    pub(super) bands: u16,
 }
 
-pub(super) const NONE: u16 = 1;
+pub(super) const JPEG: u16 = 7;
+const NONE: u16 = 1;
 const LZW: u16 = 5;
 const DEFLATE: u16 = 8;
 const OLD_DEFLATE: u16 = 32946;
@@ -33,9 +38,31 @@ const PACK_BITS: u16 = 32773;
 const ZSTD: u16 = 50000;
 
 impl Coding {
-    /// Bytes of one number.
+    /// Reads it from the tags; `bands` are the numbers of a sample that lie together.
+    pub(super) fn read(bytes: &Bytes, ifd: &Ifd, bands: u16) -> Result<Self, DemError> {
+        if ifd.short(bytes, tag::FILL_ORDER, 1)? != 1 {
+            return Err(DemError::unsupported(bytes.path(), "reversed bits (tag 266)"));
+        }
+        let compression = ifd.short(bytes, tag::COMPRESSION, 1)?;
+        // Only these have a predictor; writers leave the tag in other files, and readers pass over it.
+        let predicted = matches!(compression, LZW | DEFLATE | OLD_DEFLATE | ZSTD);
+        Ok(Self {
+            big_endian: ifd.big_endian,
+            compression,
+            predictor: if predicted { ifd.short(bytes, tag::PREDICTOR, 1)? } else { 1 },
+            bits: ifd.short(bytes, tag::BITS, 1)?,
+            // Format 4 is "undefined"; everyone reads it as unsigned.
+            format: match ifd.short(bytes, tag::SAMPLE_FORMAT, 1)? {
+                4 => 1,
+                format => format,
+            },
+            bands,
+        })
+    }
+
+    /// Bytes of the numbers of one sample.
     pub(super) fn bytes(&self) -> u64 {
-        u64::from(self.bits / 8)
+        u64::from(self.bits / 8) * u64::from(self.bands)
     }
 
     /// True when the numbers are whole.
@@ -95,7 +122,7 @@ impl Coding {
         sample_count.saturating_mul(self.bytes()) <= most
     }
 
-    /// The `rows` × `columns` numbers of a strip or tile.
+    /// The numbers of the `rows` × `columns` samples of a strip or tile.
     pub(super) fn decode(&self, stored: Vec<u8>, rows: u32, columns: u32) -> Result<Samples, String> {
         if let Some(kind) = self.plain_type() {
             return self.decode_plain(&stored, kind, rows, columns);
@@ -145,7 +172,7 @@ impl Coding {
             (259, self.compression.into()),
             (262, 1),
             (273, DATA_AT),
-            (277, 1),
+            (277, self.bands.into()),
             (278, rows),
             (279, length),
             (317, self.predictor.into()),
@@ -215,7 +242,7 @@ mod tests {
     use super::*;
 
     fn coding(compression: u16) -> Coding {
-        Coding { big_endian: false, compression, predictor: 1, bits: 16, format: 2 }
+        Coding { big_endian: false, compression, predictor: 1, bits: 16, format: 2, bands: 1 }
     }
 
     #[test]

@@ -15,31 +15,34 @@ const MAX_ENTRIES: u64 = 4096;
 const MAX_VALUE_BYTES: u64 = 1 << 20;
 
 /// Tags that are read.
-pub(in super::super) mod tag {
-    pub(in super::super::super) const WIDTH: u16 = 256;
-    pub(in super::super::super) const HEIGHT: u16 = 257;
-    pub(in super::super::super) const BITS: u16 = 258;
-    pub(in super::super::super) const COMPRESSION: u16 = 259;
-    pub(in super::super::super) const PHOTOMETRIC: u16 = 262;
-    pub(in super::super::super) const FILL_ORDER: u16 = 266;
-    pub(in super::super::super) const STRIP_OFFSETS: u16 = 273;
-    pub(in super::super::super) const SAMPLES: u16 = 277;
-    pub(in super::super::super) const ROWS_PER_STRIP: u16 = 278;
-    pub(in super::super::super) const STRIP_BYTES: u16 = 279;
-    pub(in super::super::super) const PREDICTOR: u16 = 317;
-    pub(in super::super::super) const TILE_WIDTH: u16 = 322;
-    pub(in super::super::super) const TILE_HEIGHT: u16 = 323;
-    pub(in super::super::super) const TILE_OFFSETS: u16 = 324;
-    pub(in super::super::super) const TILE_BYTES: u16 = 325;
-    pub(in super::super::super) const SAMPLE_FORMAT: u16 = 339;
-    pub(in super::super::super) const PIXEL_SCALE: u16 = 33550;
-    pub(in super::super::super) const TIE_POINTS: u16 = 33922;
-    pub(in super::super::super) const TRANSFORMATION: u16 = 34264;
-    pub(in super::super::super) const GEO_KEYS: u16 = 34735;
-    pub(in super::super::super) const GEO_DOUBLES: u16 = 34736;
-    pub(in super::super::super) const GEO_TEXT: u16 = 34737;
-    pub(in super::super::super) const GDAL_METADATA: u16 = 42112;
-    pub(in super::super::super) const GDAL_NODATA: u16 = 42113;
+pub(crate) mod tag {
+    pub(crate) const WIDTH: u16 = 256;
+    pub(crate) const HEIGHT: u16 = 257;
+    pub(crate) const BITS: u16 = 258;
+    pub(crate) const COMPRESSION: u16 = 259;
+    pub(crate) const PHOTOMETRIC: u16 = 262;
+    pub(crate) const FILL_ORDER: u16 = 266;
+    pub(crate) const STRIP_OFFSETS: u16 = 273;
+    pub(crate) const SAMPLES: u16 = 277;
+    pub(crate) const ROWS_PER_STRIP: u16 = 278;
+    pub(crate) const STRIP_BYTES: u16 = 279;
+    pub(crate) const PLANAR: u16 = 284;
+    pub(crate) const PREDICTOR: u16 = 317;
+    pub(crate) const PALETTE: u16 = 320;
+    pub(crate) const TILE_WIDTH: u16 = 322;
+    pub(crate) const TILE_HEIGHT: u16 = 323;
+    pub(crate) const TILE_OFFSETS: u16 = 324;
+    pub(crate) const TILE_BYTES: u16 = 325;
+    pub(crate) const SAMPLE_FORMAT: u16 = 339;
+    pub(crate) const JPEG_TABLES: u16 = 347;
+    pub(crate) const PIXEL_SCALE: u16 = 33550;
+    pub(crate) const TIE_POINTS: u16 = 33922;
+    pub(crate) const TRANSFORMATION: u16 = 34264;
+    pub(crate) const GEO_KEYS: u16 = 34735;
+    pub(crate) const GEO_DOUBLES: u16 = 34736;
+    pub(crate) const GEO_TEXT: u16 = 34737;
+    pub(crate) const GDAL_METADATA: u16 = 42112;
+    pub(crate) const GDAL_NODATA: u16 = 42113;
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -52,8 +55,8 @@ struct Entry {
 
 /// A directory of tags.
 #[derive(Debug)]
-pub(in super::super) struct Ifd {
-    pub(in super::super) big_endian: bool,
+pub(crate) struct Ifd {
+    pub(crate) big_endian: bool,
     entries: BTreeMap<u16, Entry>,
 }
 
@@ -84,12 +87,12 @@ const fn type_bytes(kind: u16) -> u64 {
 
 impl Ifd {
     /// True when the bytes begin like a TIFF or BigTIFF.
-    pub(in super::super) fn matches(head: &[u8]) -> bool {
+    pub(crate) fn matches(head: &[u8]) -> bool {
         matches!(head, [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..])
     }
 
     /// Reads the first directory.
-    pub(in super::super) fn read(bytes: &Bytes) -> Result<Self, DemError> {
+    pub(crate) fn read(bytes: &Bytes) -> Result<Self, DemError> {
         let head = bytes.head(16)?;
         if !Self::matches(&head) {
             return Err(DemError::format(bytes.path(), "not a TIFF: it does not begin with II or MM and 42 or 43"));
@@ -112,7 +115,7 @@ impl Ifd {
         Ok(Self { big_endian: order.big_endian, entries })
     }
 
-    pub(in super::super) fn has(&self, tag: u16) -> bool {
+    pub(crate) fn has(&self, tag: u16) -> bool {
         self.entries.contains_key(&tag)
     }
 
@@ -134,12 +137,12 @@ impl Ifd {
     }
 
     /// The whole numbers of a tag.
-    pub(in super::super) fn numbers(&self, bytes: &Bytes, tag: u16) -> Result<Option<Vec<u64>>, DemError> {
+    pub(crate) fn numbers(&self, bytes: &Bytes, tag: u16) -> Result<Option<Vec<u64>>, DemError> {
         self.table(bytes, tag, MAX_VALUE_BYTES)
     }
 
     /// The whole numbers of a tag that may be long.
-    pub(in super::super) fn table(
+    pub(crate) fn table(
         &self,
         bytes: &Bytes,
         tag: u16,
@@ -156,12 +159,18 @@ impl Ifd {
     }
 
     /// The first whole number of a tag.
-    pub(in super::super) fn number(&self, bytes: &Bytes, tag: u16) -> Result<Option<u64>, DemError> {
+    pub(crate) fn number(&self, bytes: &Bytes, tag: u16) -> Result<Option<u64>, DemError> {
         Ok(self.numbers(bytes, tag)?.and_then(|values| values.first().copied()))
     }
 
+    /// The first number of a tag, of at most 16 bits, or what stands for it where it is missing.
+    pub(crate) fn short(&self, bytes: &Bytes, tag: u16, default: u16) -> Result<u16, DemError> {
+        let value = self.number(bytes, tag)?.unwrap_or(default.into());
+        u16::try_from(value).map_err(|_| DemError::format(bytes.path(), format!("{value} in tag {tag}")))
+    }
+
     /// The floating-point numbers of a tag.
-    pub(in super::super) fn doubles(&self, bytes: &Bytes, tag: u16) -> Result<Option<Vec<f64>>, DemError> {
+    pub(crate) fn doubles(&self, bytes: &Bytes, tag: u16) -> Result<Option<Vec<f64>>, DemError> {
         let Some((entry, data)) = self.values(bytes, tag, MAX_VALUE_BYTES)? else { return Ok(None) };
         let order = self.order();
         match entry.kind {
@@ -176,8 +185,13 @@ impl Ifd {
         }
     }
 
+    /// The bytes of a tag, whatever they mean.
+    pub(crate) fn raw(&self, bytes: &Bytes, tag: u16) -> Result<Option<Vec<u8>>, DemError> {
+        Ok(self.values(bytes, tag, MAX_VALUE_BYTES)?.map(|(_, data)| data))
+    }
+
     /// The text of a tag, up to its first NUL; a character a byte, so that offsets into it hold.
-    pub(in super::super) fn text(&self, bytes: &Bytes, tag: u16) -> Result<Option<String>, DemError> {
+    pub(crate) fn text(&self, bytes: &Bytes, tag: u16) -> Result<Option<String>, DemError> {
         let Some((_, data)) = self.values(bytes, tag, MAX_VALUE_BYTES)? else { return Ok(None) };
         let end = data.iter().position(|&byte| byte == 0).unwrap_or(data.len());
         let character = |&byte: &u8| if byte.is_ascii() { char::from(byte) } else { '?' };

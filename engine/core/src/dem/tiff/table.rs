@@ -1,6 +1,6 @@
 //! Where in a TIFF its strips or tiles lie, and which samples each holds.
 
-use super::super::{DemError, bytes::Bytes};
+use super::super::{DemError, bytes::Bytes, samples::Samples};
 use super::chunk::Coding;
 use super::ifd::{Ifd, tag};
 
@@ -23,13 +23,15 @@ pub(super) struct Table {
     /// "strip" or "tile", for messages.
     pub(super) name: &'static str,
     tiled: bool,
+    /// Bands that lie apart, each in chunks of its own; 1 where they lie together.
+    planes: u16,
     /// First byte and number of bytes of every chunk.
     places: Vec<(u64, u64)>,
 }
 
 impl Table {
-    /// Reads the tables and checks that every chunk lies in the file and may be as large as it says.
-    pub(super) fn read(bytes: &Bytes, ifd: &Ifd, coding: &Coding) -> Result<Self, DemError> {
+    /// Reads the tables (of `planes` bands that lie apart, or 1) and checks that every chunk lies in the file and may be as large as it says.
+    pub(super) fn read(bytes: &Bytes, ifd: &Ifd, coding: &Coding, planes: u16) -> Result<Self, DemError> {
         let [width, height] = [tag::WIDTH, tag::HEIGHT].map(|tag| require(bytes, ifd, tag));
         let (width, height) = (width?, height?);
         let tiled = ifd.has(tag::TILE_OFFSETS);
@@ -44,7 +46,7 @@ impl Table {
             return Err(DemError::format(bytes.path(), what));
         }
         let name = if tiled { "tile" } else { "strip" };
-        let mut table = Self { width, height, chunk_columns, chunk_rows, name, tiled, places: Vec::new() };
+        let mut table = Self { width, height, chunk_columns, chunk_rows, name, tiled, planes, places: Vec::new() };
         table.places = table.read_places(bytes, ifd, coding)?;
         table.split_plain_strips(coding);
         table.check(bytes, coding)?;
@@ -56,8 +58,13 @@ impl Table {
         self.width.div_ceil(self.chunk_columns)
     }
 
-    fn down(&self) -> u32 {
+    pub(super) fn down(&self) -> u32 {
         self.height.div_ceil(self.chunk_rows)
+    }
+
+    /// Chunks of one plane.
+    pub(super) fn plane_len(&self) -> usize {
+        self.across() as usize * self.down() as usize
     }
 
     /// First byte and number of bytes of a chunk; none when the file leaves it out.
@@ -67,14 +74,15 @@ impl Table {
 
     /// Rows that a chunk stores: a tile's are whole, the last strip's are not.
     pub(super) fn stored_rows(&self, index: usize) -> u32 {
-        let first = index as u64 / u64::from(self.across()) * u64::from(self.chunk_rows);
+        let row = index % self.plane_len() / self.across() as usize;
+        let first = row as u64 * u64::from(self.chunk_rows);
         let left = u64::from(self.height).saturating_sub(first);
         if self.tiled { self.chunk_rows } else { u32::try_from(left).unwrap_or(u32::MAX).min(self.chunk_rows) }
     }
 
     fn read_places(&self, bytes: &Bytes, ifd: &Ifd, coding: &Coding) -> Result<Vec<(u64, u64)>, DemError> {
         let tags = if self.tiled { [tag::TILE_OFFSETS, tag::TILE_BYTES] } else { [tag::STRIP_OFFSETS, tag::STRIP_BYTES] };
-        let wanted = u64::from(self.across()) * u64::from(self.down());
+        let wanted = u64::from(self.across()) * u64::from(self.down()) * u64::from(self.planes);
         let offsets = ifd.table(bytes, tags[0], MAX_TABLE_BYTES)?.ok_or_else(|| missing(bytes, tags[0]))?;
         let counts = match ifd.table(bytes, tags[1], MAX_TABLE_BYTES)? {
             Some(counts) => counts,
@@ -108,7 +116,8 @@ impl Table {
         let most = (PLAIN_PART_BYTES / self.row_bytes(coding)).max(1);
         let most = u32::try_from(most).unwrap_or(u32::MAX);
         let is_enough = |(index, &(_, count)): (usize, &(u64, u64))| count >= self.plain_bytes(index, coding);
-        if self.tiled || !coding.is_plain() || self.chunk_rows <= most || !self.places.iter().enumerate().all(is_enough) {
+        let splittable = !self.tiled && self.planes == 1 && coding.is_plain();
+        if !splittable || self.chunk_rows <= most || !self.places.iter().enumerate().all(is_enough) {
             return;
         }
         // All parts but the last of all must be equal.
@@ -124,6 +133,40 @@ impl Table {
         }
         self.chunk_rows = rows;
         self.places = parts;
+    }
+
+    /// The stored bytes of a chunk, if they can hold its samples.
+    pub(super) fn stored(
+        &self,
+        bytes: &Bytes,
+        coding: &Coding,
+        index: usize,
+        (offset, count): (u64, u64),
+    ) -> Result<Vec<u8>, DemError> {
+        let (rows, columns) = (self.stored_rows(index), self.chunk_columns);
+        if !coding.is_plausible(count, u64::from(rows) * u64::from(columns)) {
+            let what = format!("{count} bytes cannot hold {rows} x {columns} samples");
+            return Err(self.damaged(bytes, index, &what));
+        }
+        bytes.read(offset, count, || format!("{} {index}", self.name))
+    }
+
+    /// The numbers of a chunk.
+    pub(super) fn decode(
+        &self,
+        bytes: &Bytes,
+        coding: &Coding,
+        index: usize,
+        place: (u64, u64),
+    ) -> Result<Samples, DemError> {
+        let stored = self.stored(bytes, coding, index, place)?;
+        let decoded = coding.decode(stored, self.stored_rows(index), self.chunk_columns);
+        decoded.map_err(|what| self.damaged(bytes, index, &what))
+    }
+
+    /// An error in a chunk.
+    pub(super) fn damaged(&self, bytes: &Bytes, index: usize, what: &str) -> DemError {
+        DemError::format(bytes.path(), format!("{} {index}: {what}", self.name))
     }
 
     fn check(&self, bytes: &Bytes, coding: &Coding) -> Result<(), DemError> {
