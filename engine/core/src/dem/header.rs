@@ -4,7 +4,7 @@ use super::DemError;
 use crate::geo::{Crs, Grid};
 
 /// The most samples along one side of a raster.
-pub const MAX_SIDE: u32 = 1 << 26;
+pub(crate) const MAX_SIDE: u32 = 1 << 26;
 
 /// A rectangle of samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,4 +91,13 @@ pub struct OpenOptions {
     pub scale: Option<f64>,
     /// The stored number that means void, for files that do not declare one.
     pub nodata: Option<f64>,
+    /// Bytes of decoded strips and tiles kept for each open file; 64 MiB if not given.
+    pub cache_bytes: Option<usize>,
+}
+
+impl OpenOptions {
+    /// The budget for decoded strips and tiles.
+    pub(crate) fn cache_bytes(&self) -> usize {
+        self.cache_bytes.unwrap_or(64 << 20)
+    }
 }

@@ -6,13 +6,29 @@
 //! looks at what a file holds rather than at its name. Row 0 is north and column 0 is west whatever the file says;
 //! void is NaN; whole numbers of metres come out exactly.
 
+mod bytes;
+mod cache;
 mod error;
+mod exr;
 mod header;
+mod hgt;
 mod image;
+mod memory;
 mod mosaic;
+mod placement;
+mod plain;
+mod png;
+mod samples;
+#[cfg(test)]
+mod tests;
+mod tiff;
+mod units;
+mod world_file;
 
 use std::path::Path;
 
+use self::bytes::Bytes;
+use self::tiff::{Ifd, Tiff};
 pub use error::DemError;
 pub use header::{OpenOptions, RasterHeader, SourceInfo, Window};
 pub use image::{Image, open_image};
@@ -36,6 +52,20 @@ pub trait Raster: Send + Sync {
 /// # Errors
 /// [`DemError`], naming the file, the place in it and the limit.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Raster>, DemError> {
-    let _ = options;
-    Err(DemError::format(path, "no known elevation format"))
+    let bytes = Bytes::open(path)?;
+    let head = bytes.head(64)?;
+    if Ifd::matches(&head) {
+        return Ok(Box::new(Tiff::open(bytes, options)?));
+    }
+    if png::matches(&head) {
+        return png::open(&bytes, options);
+    }
+    if exr::matches(&head) {
+        return exr::open(&bytes, options);
+    }
+    // An SRTM tile has nothing but its name and length to be told by.
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hgt")) {
+        return hgt::open(bytes, options);
+    }
+    Err(DemError::format(path, "not an elevation model: neither GeoTIFF, PNG, EXR nor SRTM (.hgt)"))
 }
