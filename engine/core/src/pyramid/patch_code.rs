@@ -8,20 +8,37 @@ pub const NEVER: u8 = 15;
 
 /// 2^(n/2) as f32, written out so that every reader multiplies by the same numbers; the odd ones are rounded up.
 pub const HALF_OCTAVES: [f32; 15] = [
-    1.0, 1.414_213_7, 2.0, 2.828_427_3, 4.0, 5.656_854_6, 8.0, 11.313_709, 16.0, 22.627_419, 32.0, 45.254_837, 64.0,
-    90.509_674, 128.0,
+    1.0,
+    1.414_213_7,
+    2.0,
+    2.828_427_3,
+    4.0,
+    5.656_854_6,
+    8.0,
+    11.313_709,
+    16.0,
+    22.627_419,
+    32.0,
+    45.254_837,
+    64.0,
+    90.509_674,
+    128.0,
 ];
 
 /// The error bound in metres that a nibble states, given max(δ, u) of its tile; infinite for [`NEVER`].
 #[must_use]
 pub fn patch_error(nibble: u8, base: f32) -> f32 {
-    HALF_OCTAVES.get(usize::from(nibble)).map_or(f32::INFINITY, |factor| base * factor)
+    HALF_OCTAVES
+        .get(usize::from(nibble))
+        .map_or(f32::INFINITY, |factor| base * factor)
 }
 
 /// The least nibble whose bound is no less than an error in metres, given max(δ, u) of its tile.
 #[must_use]
 pub fn patch_nibble(error: f64, base: f32) -> u8 {
-    (0..NEVER).find(|nibble| f64::from(patch_error(*nibble, base)) >= error).unwrap_or(NEVER)
+    (0..NEVER)
+        .find(|nibble| f64::from(patch_error(*nibble, base)) >= error)
+        .unwrap_or(NEVER)
 }
 
 #[cfg(test)]
@@ -34,7 +51,10 @@ mod tests {
             for step in 1..2000 {
                 let error = f64::from(base) * f64::from(step) * 0.05;
                 let bound = f64::from(patch_error(patch_nibble(error, base), base));
-                assert!(bound >= error && (bound <= error * 1.4143 || bound <= f64::from(base)), "{error} {bound}");
+                assert!(
+                    bound >= error && (bound <= error * 1.4143 || bound <= f64::from(base)),
+                    "{error} {bound}"
+                );
             }
         }
         assert_eq!(patch_nibble(0.0, 1.0), 0);

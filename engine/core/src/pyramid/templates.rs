@@ -27,15 +27,30 @@ pub const WEST: u8 = 8;
 
 /// The ring of points around the centre, counter-clockwise as seen from above (row 0 is north), from the north-west:
 /// each with the edge that must be split for it to be a vertex.
-const RING: [(u8, u8); 8] = [(0, 0), (3, WEST), (6, 0), (7, SOUTH), (8, 0), (5, EAST), (2, 0), (1, NORTH)];
+const RING: [(u8, u8); 8] = [
+    (0, 0),
+    (3, WEST),
+    (6, 0),
+    (7, SOUTH),
+    (8, 0),
+    (5, EAST),
+    (2, 0),
+    (1, NORTH),
+];
 
 /// The triangles of a cell with the given split edges, as points of the cell (row · 3 + column, counted in half
 /// sides), counter-clockwise as seen from above: two for a plain cell, else five to eight about the centre.
 pub fn cell_triangles(split: u8) -> impl Iterator<Item = [u8; 3]> {
-    let plain = [[0, 6, 8], [0, 8, 2]].into_iter().filter(move |_| split == 0);
+    let plain = [[0, 6, 8], [0, 8, 2]]
+        .into_iter()
+        .filter(move |_| split == 0);
     let fan = (0..8).filter_map(move |index| {
         let present = |ring: usize| RING[ring % 8].1 & !split == 0;
-        let next = if present(index + 1) { index + 1 } else { index + 2 };
+        let next = if present(index + 1) {
+            index + 1
+        } else {
+            index + 2
+        };
         (split != 0 && present(index)).then_some([4, RING[index].0, RING[next % 8].0])
     });
     plain.chain(fan)
@@ -65,7 +80,11 @@ mod tests {
             let areas: Vec<i32> = cell_triangles(split).map(doubled_area).collect();
             assert!(areas.iter().all(|area| *area > 0), "{split}");
             assert_eq!(areas.iter().sum::<i32>(), 8, "{split}");
-            let count = if split == 0 { 2 } else { 4 + split.count_ones() as usize };
+            let count = if split == 0 {
+                2
+            } else {
+                4 + split.count_ones() as usize
+            };
             assert_eq!(areas.len(), count, "{split}");
         }
     }

@@ -31,7 +31,11 @@ pub(super) fn coarsen(fine: &LevelSamples, coarse: &mut LevelSamples) -> [usize;
     });
     let fitted = fit_plane(&fine.values, fine.columns, &axes);
     let width = coarse.columns;
-    for (out, line) in coarse.values.chunks_exact_mut(width).zip(fitted.chunks_exact(axes[1].count)) {
+    for (out, line) in coarse
+        .values
+        .chunks_exact_mut(width)
+        .zip(fitted.chunks_exact(axes[1].count))
+    {
         out[..line.len()].copy_from_slice(line);
     }
     [axes[0].count, axes[1].count]
@@ -75,7 +79,9 @@ impl<const B: usize, const P: usize> Axis<B, P> {
             };
             load(inner, &mut mirror);
             load(end, out);
-            out.iter_mut().zip(&mirror).for_each(|(out, inner)| *out = 2.0 * *out - inner);
+            out.iter_mut()
+                .zip(&mirror)
+                .for_each(|(out, inner)| *out = 2.0 * *out - inner);
         });
         all[self.first * width..(self.first + self.count) * width].to_vec()
     }
@@ -105,12 +111,22 @@ impl<const B: usize, const P: usize> Fit<B, P> {
         }
         for k in 0..count {
             for d in (0..B.min(k + 1)).rev() {
-                let shared: f64 = (d + 1..B.min(k + 1)).map(|e| factor[k][e] * factor[k - d][e - d]).sum();
+                let shared: f64 = (d + 1..B.min(k + 1))
+                    .map(|e| factor[k][e] * factor[k - d][e - d])
+                    .sum();
                 let rest = factor[k][d] - shared;
-                factor[k][d] = if d == 0 { rest.sqrt().recip() } else { rest * factor[k - d][0] };
+                factor[k][d] = if d == 0 {
+                    rest.sqrt().recip()
+                } else {
+                    rest * factor[k - d][0]
+                };
             }
         }
-        Self { weights, samples, factor }
+        Self {
+            weights,
+            samples,
+            factor,
+        }
     }
 
     fn solve(&self, width: usize, mut load: impl FnMut(usize, &mut [f64])) -> Vec<f64> {
@@ -121,22 +137,38 @@ impl<const B: usize, const P: usize> Fit<B, P> {
             load(sample, &mut line);
             let (first, weights) = (sample / P, self.weights[sample % P]);
             for a in (0..B.min(count - first)).filter(|a| weights[*a] != 0.0) {
-                add_scaled(&mut solution[(first + a) * width..][..width], weights[a], &line);
+                add_scaled(
+                    &mut solution[(first + a) * width..][..width],
+                    weights[a],
+                    &line,
+                );
             }
         }
         for k in 0..count {
             let (done, rest) = solution.split_at_mut(k * width);
             for d in 1..B.min(k + 1) {
-                add_scaled(&mut rest[..width], -self.factor[k][d], &done[(k - d) * width..][..width]);
+                add_scaled(
+                    &mut rest[..width],
+                    -self.factor[k][d],
+                    &done[(k - d) * width..][..width],
+                );
             }
-            rest[..width].iter_mut().for_each(|value| *value *= self.factor[k][0]);
+            rest[..width]
+                .iter_mut()
+                .for_each(|value| *value *= self.factor[k][0]);
         }
         for k in (0..count).rev() {
             let (rest, done) = solution.split_at_mut((k + 1) * width);
             for d in 1..B.min(count - k) {
-                add_scaled(&mut rest[k * width..], -self.factor[k + d][d], &done[(d - 1) * width..][..width]);
+                add_scaled(
+                    &mut rest[k * width..],
+                    -self.factor[k + d][d],
+                    &done[(d - 1) * width..][..width],
+                );
             }
-            rest[k * width..].iter_mut().for_each(|value| *value *= self.factor[k][0]);
+            rest[k * width..]
+                .iter_mut()
+                .for_each(|value| *value *= self.factor[k][0]);
         }
         solution
     }
@@ -149,51 +181,69 @@ fn add_scaled(sum: &mut [f64], factor: f64, values: &[f64]) {
 }
 
 /// Fits rows, then columns; rounds to units.
-fn fit_plane<const B: usize, const P: usize>(values: &[i32], columns: usize, axes: &[Axis<B, P>; 2]) -> Vec<i32> {
+fn fit_plane<const B: usize, const P: usize>(
+    values: &[i32],
+    columns: usize,
+    axes: &[Axis<B, P>; 2],
+) -> Vec<i32> {
     let [down, across] = axes;
     // f32 keeps 24 bits, a unit at the limit of heights; steps are many units.
     let mut half = vec![0.0_f32; down.samples * across.count];
-    half.par_chunks_mut(LANES * across.count).enumerate().for_each(|(block, out)| {
-        let width = out.len() / across.count;
-        let rows = &values[block * LANES * columns..];
-        let fitted = across.solve(width, |place, lanes| {
-            for (lane, value) in lanes.iter_mut().enumerate() {
-                *value = f64::from(rows[lane * columns + place]);
+    half.par_chunks_mut(LANES * across.count)
+        .enumerate()
+        .for_each(|(block, out)| {
+            let width = out.len() / across.count;
+            let rows = &values[block * LANES * columns..];
+            let fitted = across.solve(width, |place, lanes| {
+                for (lane, value) in lanes.iter_mut().enumerate() {
+                    *value = f64::from(rows[lane * columns + place]);
+                }
+            });
+            for (place, lanes) in fitted.chunks_exact(width).enumerate() {
+                for (lane, value) in lanes.iter().enumerate() {
+                    out[lane * across.count + place] = to_f32(*value);
+                }
             }
         });
-        for (place, lanes) in fitted.chunks_exact(width).enumerate() {
-            for (lane, value) in lanes.iter().enumerate() {
-                out[lane * across.count + place] = to_f32(*value);
-            }
-        }
-    });
     let blocks: Vec<Vec<i32>> = (0..across.count.div_ceil(LANES))
         .into_par_iter()
         .map(|block| {
             let width = LANES.min(across.count - block * LANES);
             let fitted = down.solve(width, |place, lanes| {
                 let line = &half[place * across.count + block * LANES..];
-                lanes.iter_mut().zip(line).for_each(|(lane, value)| *lane = f64::from(*value));
+                lanes
+                    .iter_mut()
+                    .zip(line)
+                    .for_each(|(lane, value)| *lane = f64::from(*value));
             });
             fitted.into_iter().map(round).collect()
         })
         .collect();
     drop(half);
     let mut fitted = vec![0; down.count * across.count];
-    fitted.par_chunks_exact_mut(across.count).enumerate().for_each(|(row, out)| {
-        for (block, out) in blocks.iter().zip(out.chunks_mut(LANES)) {
-            out.copy_from_slice(&block[row * out.len()..][..out.len()]);
-        }
-    });
+    fitted
+        .par_chunks_exact_mut(across.count)
+        .enumerate()
+        .for_each(|(row, out)| {
+            for (block, out) in blocks.iter().zip(out.chunks_mut(LANES)) {
+                out.copy_from_slice(&block[row * out.len()..][..out.len()]);
+            }
+        });
     fitted
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "rounding to the nearest is meant")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "rounding to the nearest is meant"
+)]
 fn to_f32(value: f64) -> f32 {
     value as f32
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "heights are under 2^25 units; what is absurd saturates")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "heights are under 2^25 units; what is absurd saturates"
+)]
 fn round(value: f64) -> i32 {
     value.round() as i32
 }
@@ -205,10 +255,19 @@ mod tests {
     use crate::pyramid::surface::base_heights;
 
     fn level(side: u32, level: u8, height: impl Fn(i32, i32) -> i32) -> LevelSamples {
-        let mut samples = LevelSamples::new(&Grid { columns: side, rows: side, origin: [0.0; 2], step: [1.0, -1.0] }, level);
+        let mut samples = LevelSamples::new(
+            &Grid {
+                columns: side,
+                rows: side,
+                origin: [0.0; 2],
+                step: [1.0, -1.0],
+            },
+            level,
+        );
         let columns = samples.columns;
         for (index, value) in samples.values.iter_mut().enumerate() {
-            let [row, column] = [index / columns, index % columns].map(|place| i32::try_from(place).unwrap());
+            let [row, column] =
+                [index / columns, index % columns].map(|place| i32::try_from(place).unwrap());
             *value = height(row, column);
         }
         samples
@@ -222,7 +281,8 @@ mod tests {
         let mut coarse = level(129, 0, |_, _| 0);
         assert_eq!(coarsen(&smooth, &mut coarse), [129, 129]);
         for (index, value) in coarse.values.iter().enumerate() {
-            let [row, column] = [index / 129, index % 129].map(|place| i32::try_from(place).unwrap());
+            let [row, column] =
+                [index / 129, index % 129].map(|place| i32::try_from(place).unwrap());
             assert_eq!(*value, 40 * (2 * row - 100).abs() - 24 * column);
         }
         assert_eq!(fine.values.len(), smooth.values.len());
@@ -236,11 +296,18 @@ mod tests {
         coarsen(&fine, &mut coarse);
         let energy = |at: &dyn Fn(usize, usize) -> f64| -> f64 {
             let line = |row: usize, column: usize| at(row.div_euclid(2), column.div_euclid(2));
-            (0..256).flat_map(|row| (0..256).map(move |column| (row, column))).map(|(row, column)| {
-                let [r, c] = [row % 2, column % 2];
-                let mean = (line(row, column) + line(row + r, column) + line(row, column + c) + line(row + r, column + c)) / 4.0;
-                (mean - f64::from(fine.values[row * 257 + column])).powi(2)
-            }).sum()
+            (0..256)
+                .flat_map(|row| (0..256).map(move |column| (row, column)))
+                .map(|(row, column)| {
+                    let [r, c] = [row % 2, column % 2];
+                    let mean = (line(row, column)
+                        + line(row + r, column)
+                        + line(row, column + c)
+                        + line(row + r, column + c))
+                        / 4.0;
+                    (mean - f64::from(fine.values[row * 257 + column])).powi(2)
+                })
+                .sum()
         };
         let fitted = energy(&|row, column| f64::from(coarse.values[row * 129 + column]));
         let picked = energy(&|row, column| f64::from(fine.values[2 * row * 257 + 2 * column]));
@@ -249,7 +316,9 @@ mod tests {
 
     #[test]
     fn a_cage_reproduces_its_own_surface() {
-        let controls: Vec<i32> = (0..35 * 35).map(|i: i32| (i * 7919 % 4001 - 2000) * 64).collect();
+        let controls: Vec<i32> = (0..35 * 35)
+            .map(|i: i32| (i * 7919 % 4001 - 2000) * 64)
+            .collect();
         let mut samples = level(129, 0, |_, _| 0);
         samples.values = base_heights(&controls);
         let fitted = cage(&samples, [1, 1]);
@@ -257,7 +326,9 @@ mod tests {
         // Away from the border, where the data is made up, the surface is the same but for rounding.
         for row in 40..89 {
             for column in 40..89 {
-                assert!((again[row * 129 + column] - samples.values[row * 129 + column]).abs() <= 40);
+                assert!(
+                    (again[row * 129 + column] - samples.values[row * 129 + column]).abs() <= 40
+                );
             }
         }
     }

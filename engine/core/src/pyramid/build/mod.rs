@@ -63,14 +63,19 @@ pub fn build(
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(options.threads.unwrap_or(0))
         .build()
-        .map_err(|error| PyramidError::Refused(format!("the threads could not be started: {error}")))?;
+        .map_err(|error| {
+            PyramidError::Refused(format!("the threads could not be started: {error}"))
+        })?;
     let writer = PyramidWriter::resume(&options.output, options.overwrite, &plan.fingerprint)?;
     let watch = Watch::new(progress, cancel);
     let made = pool.install(|| plan.run(raster, imagery, options, &writer, &watch));
     match made {
         Ok((metadata, shards, report)) => {
             writer.publish(&metadata, &shards)?;
-            Ok(BuildReport { seconds: start.elapsed().as_secs_f64(), ..report })
+            Ok(BuildReport {
+                seconds: start.elapsed().as_secs_f64(),
+                ..report
+            })
         }
         Err(error) => {
             let resumable = matches!(error, PyramidError::Interrupted | PyramidError::Io { .. });
@@ -91,12 +96,19 @@ struct Plan {
 }
 
 impl Plan {
-    fn new(raster: &dyn Raster, imagery: Option<&Imagery<'_>>, options: &BuildOptions) -> Result<Self, PyramidError> {
+    fn new(
+        raster: &dyn Raster,
+        imagery: Option<&Imagery<'_>>,
+        options: &BuildOptions,
+    ) -> Result<Self, PyramidError> {
         let header = raster.header();
         let grid = header.grid;
         let scale = Scale::new(options.eps, options.unit, header.integer)?;
         let memory_bytes = memory_bytes(&grid, imagery, options);
-        if let Some(budget) = options.memory_budget.filter(|budget| *budget < memory_bytes) {
+        if let Some(budget) = options
+            .memory_budget
+            .filter(|budget| *budget < memory_bytes)
+        {
             return Err(PyramidError::Refused(format!(
                 "building {} x {} samples takes about {} MiB of memory; the budget is {} MiB",
                 grid.rows,
@@ -105,8 +117,17 @@ impl Plan {
                 budget >> 20
             )));
         }
-        let fingerprint = if options.sources.is_empty() { String::new() } else { fingerprint(raster, imagery, options, &scale) };
-        Ok(Self { grid, scale, memory_bytes, fingerprint })
+        let fingerprint = if options.sources.is_empty() {
+            String::new()
+        } else {
+            fingerprint(raster, imagery, options, &scale)
+        };
+        Ok(Self {
+            grid,
+            scale,
+            memory_bytes,
+            fingerprint,
+        })
     }
 
     fn run(
@@ -128,12 +149,15 @@ impl Plan {
         let mut report = self.report(options, &shards, root_error);
         report.void_samples = finest.void_count(data);
         let levels = { levels }.levels;
-        let color = imagery.map(|imagery| color::write(imagery, grid, writer, watch)).transpose()?.map(|(color, infos)| {
-            report.color_levels = color.levels;
-            report.color_bytes = infos.iter().map(|info| info.bytes).sum();
-            shards.extend(infos);
-            color
-        });
+        let color = imagery
+            .map(|imagery| color::write(imagery, grid, writer, watch))
+            .transpose()?
+            .map(|(color, infos)| {
+                report.color_levels = color.levels;
+                report.color_bytes = infos.iter().map(|info| info.bytes).sum();
+                shards.extend(infos);
+                color
+            });
         let metadata = Metadata {
             version: Metadata::VERSION,
             grid: *grid,
@@ -154,7 +178,11 @@ impl Plan {
         let level_bytes: Vec<u64> = (0..grid.level_count())
             .map(|level| {
                 let prefix = format!("tile/{level}/");
-                shards.iter().filter(|info| info.key.starts_with(&prefix)).map(|info| info.bytes).sum()
+                shards
+                    .iter()
+                    .filter(|info| info.key.starts_with(&prefix))
+                    .map(|info| info.bytes)
+                    .sum()
             })
             .collect();
         BuildReport {
@@ -176,16 +204,27 @@ impl Plan {
 /// The memory a build takes at its peak, in bytes.
 fn memory_bytes(grid: &Grid, imagery: Option<&Imagery<'_>>, options: &BuildOptions) -> u64 {
     let threads = options.threads.unwrap_or_else(rayon::current_num_threads) as u64;
-    let imagery = imagery.map_or(0, |imagery| 3 * imagery.image.rgb.len() as u64 + color::memory_bytes(imagery.image, grid));
+    let imagery = imagery.map_or(0, |imagery| {
+        3 * imagery.image.rgb.len() as u64 + color::memory_bytes(imagery.image, grid)
+    });
     // A thread reads 64 rows at a time.
     let strip = 64 * 8 * u64::from(grid.columns);
     FIXED_BYTES + threads * (THREAD_BYTES + strip) + Levels::memory_bytes(grid) + imagery
 }
 
 /// One line that says all that decides the bytes: an interrupted build of the same is gone on with.
-fn fingerprint(raster: &dyn Raster, imagery: Option<&Imagery<'_>>, options: &BuildOptions, scale: &Scale) -> String {
+fn fingerprint(
+    raster: &dyn Raster,
+    imagery: Option<&Imagery<'_>>,
+    options: &BuildOptions,
+    scale: &Scale,
+) -> String {
     let header = raster.header();
     let imagery = imagery.map(|imagery| (&imagery.sources, imagery.image.extent));
     let version = env!("CARGO_PKG_VERSION");
-    format!("{version} {:?} {:?} {:?} {:?} {imagery:?}", header.grid, header.crs, scale, options.sources).replace('\n', " ")
+    format!(
+        "{version} {:?} {:?} {:?} {:?} {imagery:?}",
+        header.grid, header.crs, scale, options.sources
+    )
+    .replace('\n', " ")
 }

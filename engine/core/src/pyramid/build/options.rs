@@ -128,13 +128,25 @@ impl<'a> Watch<'a> {
     }
 
     /// Starts a stage of so many steps; the result is to be called with every few of them.
-    pub(super) fn stage(&self, stage: Stage, total: u64) -> impl Fn(u64) -> Result<(), PyramidError> + Sync + '_ {
+    pub(super) fn stage(
+        &self,
+        stage: Stage,
+        total: u64,
+    ) -> impl Fn(u64) -> Result<(), PyramidError> + Sync + '_ {
         let count = AtomicU64::new(0);
-        (self.progress)(Progress { stage, done: 0, total });
+        (self.progress)(Progress {
+            stage,
+            done: 0,
+            total,
+        });
         move |steps| {
             let done = count.fetch_add(steps, Ordering::Relaxed) + steps;
             (self.progress)(Progress { stage, done, total });
-            if self.cancel.load(Ordering::Relaxed) { Err(PyramidError::Interrupted) } else { Ok(()) }
+            if self.cancel.load(Ordering::Relaxed) {
+                Err(PyramidError::Interrupted)
+            } else {
+                Ok(())
+            }
         }
     }
 }

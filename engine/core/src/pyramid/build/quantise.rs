@@ -40,9 +40,17 @@ impl LevelCage {
     fn predict_row(&self, row: usize, out: &mut [i32]) {
         let coarse = |tap: usize| &self.controls[(row / 2 + tap) * self.columns..][..self.columns];
         let sums: Vec<i64> = match row % 2 {
-            0 => coarse(0).iter().zip(coarse(1)).map(|(a, b)| 4 * (i64::from(*a) + i64::from(*b))).collect(),
+            0 => coarse(0)
+                .iter()
+                .zip(coarse(1))
+                .map(|(a, b)| 4 * (i64::from(*a) + i64::from(*b)))
+                .collect(),
             _ => (0..self.columns)
-                .map(|at| i64::from(coarse(0)[at]) + 6 * i64::from(coarse(1)[at]) + i64::from(coarse(2)[at]))
+                .map(|at| {
+                    i64::from(coarse(0)[at])
+                        + 6 * i64::from(coarse(1)[at])
+                        + i64::from(coarse(2)[at])
+                })
                 .collect(),
         };
         for (column, out) in out.iter_mut().enumerate() {
@@ -68,23 +76,31 @@ pub(super) fn is_key(level: u8) -> bool {
 ///
 /// # Errors
 /// [`PyramidError::Refused`] where a control leaves the range of the 32-bit rule.
-pub(super) fn quantise(cage: &mut LevelCage, parent: Option<&LevelCage>, step: i32) -> Result<u8, PyramidError> {
+pub(super) fn quantise(
+    cage: &mut LevelCage,
+    parent: Option<&LevelCage>,
+    step: i32,
+) -> Result<u8, PyramidError> {
     let columns = cage.columns;
-    let lines = cage.controls.par_chunks_exact_mut(columns).enumerate().map(|(row, line)| {
-        let mut predicted = vec![0; columns];
-        if let Some(parent) = parent {
-            parent.predict_row(row, &mut predicted);
-        }
-        let (mut width, mut greatest) = (1, 0);
-        for (control, predicted) in line.iter_mut().zip(predicted) {
-            let code = nearest(*control - predicted, step);
-            *control = predicted + code * step;
-            let stored = if parent.is_some() { code } else { *control };
-            width = width.max(number_bytes(stored));
-            greatest = greatest.max(control.unsigned_abs());
-        }
-        (width, greatest)
-    });
+    let lines = cage
+        .controls
+        .par_chunks_exact_mut(columns)
+        .enumerate()
+        .map(|(row, line)| {
+            let mut predicted = vec![0; columns];
+            if let Some(parent) = parent {
+                parent.predict_row(row, &mut predicted);
+            }
+            let (mut width, mut greatest) = (1, 0);
+            for (control, predicted) in line.iter_mut().zip(predicted) {
+                let code = nearest(*control - predicted, step);
+                *control = predicted + code * step;
+                let stored = if parent.is_some() { code } else { *control };
+                width = width.max(number_bytes(stored));
+                greatest = greatest.max(control.unsigned_abs());
+            }
+            (width, greatest)
+        });
     let (width, control) = lines.reduce(|| (1, 0), |a, b| (a.0.max(b.0), a.1.max(b.1)));
     if control >= CONTROL_LIMIT.unsigned_abs() {
         return Err(PyramidError::Refused(format!(
@@ -105,8 +121,13 @@ mod tests {
     use crate::pyramid::surface::{child_window, decode_controls};
 
     fn noise(tiles: [u32; 2], scale: i32) -> LevelCage {
-        let count = tiles.map(|count| count as usize * TILE_QUADS + 3).iter().product::<usize>();
-        let controls = (0..i32::try_from(count).unwrap()).map(|i| (i * 7919 % 4001 - 2000) * scale).collect();
+        let count = tiles
+            .map(|count| count as usize * TILE_QUADS + 3)
+            .iter()
+            .product::<usize>();
+        let controls = (0..i32::try_from(count).unwrap())
+            .map(|i| (i * 7919 % 4001 - 2000) * scale)
+            .collect();
         LevelCage::new(tiles, controls)
     }
 

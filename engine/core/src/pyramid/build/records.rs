@@ -8,7 +8,8 @@ use super::options::{Stage, Watch};
 use crate::geo::{Grid, TileId};
 use crate::pyramid::surface::{child_window, encode_detail};
 use crate::pyramid::{
-    PyramidError, PyramidWriter, RecordLayout, RecordParts, ShardInfo, Summary, patch_nibble, shard_count,
+    PyramidError, PyramidWriter, RecordLayout, RecordParts, ShardInfo, Summary, patch_nibble,
+    shard_count,
 };
 
 /// What was measured of a tile.
@@ -23,8 +24,17 @@ pub(super) struct Measured {
 pub(super) type Measures = Vec<Vec<Measured>>;
 
 /// Measures all tiles, from the finest level up.
-pub(super) fn measure_all(levels: &Levels, grid: &Grid, unit: f64, watch: &Watch<'_>) -> Result<Measures, PyramidError> {
-    let tiles = levels.levels.iter().map(|level| tile_count(level.tiles)).sum();
+pub(super) fn measure_all(
+    levels: &Levels,
+    grid: &Grid,
+    unit: f64,
+    watch: &Watch<'_>,
+) -> Result<Measures, PyramidError> {
+    let tiles = levels
+        .levels
+        .iter()
+        .map(|level| tile_count(level.tiles))
+        .sum();
     let advance = watch.stage(Stage::Measure, tiles);
     let mut measures = Measures::new();
     for level in (0..grid.level_count()).rev() {
@@ -58,7 +68,9 @@ pub(super) fn write_all(
         let [rows, columns] = shard_count(grid.tiles(level));
         (0..rows).flat_map(move |row| (0..columns).map(move |column| [row, column]))
     };
-    let total = (0..grid.level_count()).map(|level| shards_of(level).count() as u64).sum();
+    let total = (0..grid.level_count())
+        .map(|level| shards_of(level).count() as u64)
+        .sum();
     let advance = watch.stage(Stage::Write, total);
     let mut infos = Vec::new();
     for level in (0..grid.level_count()).rev() {
@@ -72,24 +84,48 @@ pub(super) fn write_all(
     Ok(infos)
 }
 
-fn measure_tile(levels: &Levels, grid: &Grid, tile: TileId, children: &[Summary; 4], unit: f64) -> Measured {
+fn measure_tile(
+    levels: &Levels,
+    grid: &Grid,
+    tile: TileId,
+    children: &[Summary; 4],
+    unit: f64,
+) -> Measured {
     let place = [tile.row, tile.column];
     let samples = &levels.samples[usize::from(tile.level)];
     let heights = samples.tile(place);
-    let finest = Finest::new(&levels.samples[levels.samples.len() - 1], [grid.rows, grid.columns].map(|count| count as usize));
-    #[expect(clippy::cast_possible_truncation, reason = "a sample's row and column, under 2^27")]
+    let finest = Finest::new(
+        &levels.samples[levels.samples.len() - 1],
+        [grid.rows, grid.columns].map(|count| count as usize),
+    );
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "a sample's row and column, under 2^27"
+    )]
     let first = grid.first_sample(tile).map(|first| first as usize);
     let errors = measure(&heights, first, grid.stride(tile.level) as usize, &finest);
     let voids = samples.tile_voids(place).map_or(0, |(_, count)| count);
     let summary = summarise(&heights, voids, ceil_f32(errors.whole * unit), children);
     let patch_codes = patch_codes(&errors, summary.error, unit);
-    Measured { summary, patch_codes }
+    Measured {
+        summary,
+        patch_codes,
+    }
 }
 
 /// A tile's summary from its own samples and its children's summaries.
 fn summarise(heights: &[i32], voids: usize, error: f32, children: &[Summary; 4]) -> Summary {
-    let own = heights.iter().fold((i32::MAX, i32::MIN), |(min, max), height| (min.min(*height), max.max(*height)));
-    let mut summary = Summary { min: own.0, max: own.1, error, flags: Summary::PRESENT };
+    let own = heights
+        .iter()
+        .fold((i32::MAX, i32::MIN), |(min, max), height| {
+            (min.min(*height), max.max(*height))
+        });
+    let mut summary = Summary {
+        min: own.0,
+        max: own.1,
+        error,
+        flags: Summary::PRESENT,
+    };
     for child in children.iter().filter(|child| child.is_present()) {
         summary.min = summary.min.min(child.min);
         summary.max = summary.max.max(child.max);
@@ -107,11 +143,21 @@ fn summarise(heights: &[i32], voids: usize, error: f32, children: &[Summary; 4])
 fn patch_codes(errors: &TileErrors, tile_error: f32, unit: f64) -> Vec<u8> {
     let base = tile_error.max(ceil_f32(unit));
     let nibble = |error: f64| patch_nibble(error * unit, base);
-    errors.patches.iter().map(|[coarse, middle]| nibble(*coarse) | nibble(*middle) << 4).collect()
+    errors
+        .patches
+        .iter()
+        .map(|[coarse, middle]| nibble(*coarse) | nibble(*middle) << 4)
+        .collect()
 }
 
 /// The record of a tile.
-fn record(levels: &Levels, measures: &Measures, grid: &Grid, layout: &RecordLayout, tile: TileId) -> Vec<u8> {
+pub(super) fn record(
+    levels: &Levels,
+    measures: &Measures,
+    grid: &Grid,
+    layout: &RecordLayout,
+    tile: TileId,
+) -> Vec<u8> {
     let index = usize::from(tile.level);
     let (level, place) = (&levels.levels[index], [tile.row, tile.column]);
     let controls = levels.cages[index].tile(place);
@@ -123,7 +169,11 @@ fn record(levels: &Levels, measures: &Measures, grid: &Grid, layout: &RecordLayo
         Some(parent) => {
             let above = levels.cages[usize::from(parent.level)].tile([parent.row, parent.column]);
             let predicted = child_window(&above, tile.quadrant());
-            controls.iter().zip(predicted).map(|(control, predicted)| (control - predicted) / level.step).collect()
+            controls
+                .iter()
+                .zip(predicted)
+                .map(|(control, predicted)| (control - predicted) / level.step)
+                .collect()
         }
     };
     layout.encode(&RecordParts {
@@ -149,7 +199,10 @@ fn index_of(grid: &Grid, tile: TileId) -> usize {
     tile.row as usize * grid.tiles(tile.level)[1] as usize + tile.column as usize
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "rows and columns of tiles are u32")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "rows and columns of tiles are u32"
+)]
 fn tile_at(grid: &Grid, level: u8, index: u64) -> TileId {
     let columns = u64::from(grid.tiles(level)[1]);
     TileId::new(level, (index / columns) as u32, (index % columns) as u32)
@@ -163,5 +216,9 @@ fn tile_count([rows, columns]: [u32; 2]) -> u64 {
 #[expect(clippy::cast_possible_truncation, reason = "corrected upwards")]
 fn ceil_f32(value: f64) -> f32 {
     let nearest = value as f32;
-    if f64::from(nearest) < value { nearest.next_up() } else { nearest }
+    if f64::from(nearest) < value {
+        nearest.next_up()
+    } else {
+        nearest
+    }
 }

@@ -26,24 +26,46 @@ pub(super) fn read_finest(
     let mut level = LevelSamples::new(&grid, grid.level_count() - 1);
     let width = level.columns;
     let used = grid.rows as usize * width;
-    level.values[..used].par_chunks_mut(STRIP_ROWS * width).enumerate().try_for_each(|(strip, out)| {
-        read_strip(raster, unit, strip * STRIP_ROWS, width, out)?;
-        advance((out.len() / width) as u64)
-    })?;
+    level.values[..used]
+        .par_chunks_mut(STRIP_ROWS * width)
+        .enumerate()
+        .try_for_each(|(strip, out)| {
+            read_strip(raster, unit, strip * STRIP_ROWS, width, out)?;
+            advance((out.len() / width) as u64)
+        })?;
     level.take_voids(VOID);
     Ok(level)
 }
 
 /// Reads the rows of one strip into rows of `width`.
-fn read_strip(raster: &dyn Raster, unit: f64, first: usize, width: usize, out: &mut [i32]) -> Result<(), PyramidError> {
+fn read_strip(
+    raster: &dyn Raster,
+    unit: f64,
+    first: usize,
+    width: usize,
+    out: &mut [i32],
+) -> Result<(), PyramidError> {
     let columns = raster.header().grid.columns;
     let rows = out.len() / width;
     let mut heights = vec![0.0; rows * columns as usize];
     let [row, rows] = [first, rows].map(|count| u32::try_from(count).unwrap_or(u32::MAX));
-    raster.read(Window { row, column: 0, rows, columns }, &mut heights)?;
-    for (line, (heights, out)) in heights.chunks_exact(columns as usize).zip(out.chunks_exact_mut(width)).enumerate() {
+    raster.read(
+        Window {
+            row,
+            column: 0,
+            rows,
+            columns,
+        },
+        &mut heights,
+    )?;
+    for (line, (heights, out)) in heights
+        .chunks_exact(columns as usize)
+        .zip(out.chunks_exact_mut(width))
+        .enumerate()
+    {
         for (column, (height, out)) in heights.iter().zip(out).enumerate() {
-            *out = to_units(*height, unit).ok_or_else(|| out_of_range(first + line, column, *height, unit))?;
+            *out = to_units(*height, unit)
+                .ok_or_else(|| out_of_range(first + line, column, *height, unit))?;
         }
     }
     Ok(())
@@ -73,7 +95,13 @@ mod tests {
 
     #[test]
     fn heights_are_rounded_and_voids_marked() {
-        let field = Field::new(70, 3, |row, column| if row == 69 { f64::NAN } else { row as f64 + 0.3 * column as f64 });
+        let field = Field::new(70, 3, |row, column| {
+            if row == 69 {
+                f64::NAN
+            } else {
+                row as f64 + 0.3 * column as f64
+            }
+        });
         let level = read_finest(&field, 0.25, &|_| Ok(())).unwrap();
         assert_eq!(&level.values[68 * level.columns..][..3], &[272, 273, 274]);
         let voids = level.voids.unwrap();
@@ -83,7 +111,12 @@ mod tests {
     #[test]
     fn heights_out_of_range_are_named() {
         let field = Field::new(2, 2, |row, _| if row == 1 { 1e12 } else { 0.0 });
-        let error = read_finest(&field, 1.0, &|_| Ok(())).unwrap_err().to_string();
-        assert!(error.contains("row 1, column 0") && error.contains("2^25"), "{error}");
+        let error = read_finest(&field, 1.0, &|_| Ok(()))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("row 1, column 0") && error.contains("2^25"),
+            "{error}"
+        );
     }
 }

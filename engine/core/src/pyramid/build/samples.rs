@@ -17,7 +17,10 @@ pub(super) struct BitGrid {
 impl BitGrid {
     pub(super) fn new(rows: usize, columns: usize) -> Self {
         let words_per_row = columns.div_ceil(64);
-        Self { words_per_row, words: vec![0; rows * words_per_row] }
+        Self {
+            words_per_row,
+            words: vec![0; rows * words_per_row],
+        }
     }
 
     pub(super) fn get(&self, row: usize, column: usize) -> bool {
@@ -36,11 +39,16 @@ impl BitGrid {
         if from == to {
             return words[from] & head & tail != 0;
         }
-        words[from] & head != 0 || words[to] & tail != 0 || words[from + 1..to].iter().any(|word| *word != 0)
+        words[from] & head != 0
+            || words[to] & tail != 0
+            || words[from + 1..to].iter().any(|word| *word != 0)
     }
 
     pub(super) fn count(&self) -> u64 {
-        self.words.iter().map(|word| u64::from(word.count_ones())).sum()
+        self.words
+            .iter()
+            .map(|word| u64::from(word.count_ones()))
+            .sum()
     }
 }
 
@@ -61,7 +69,12 @@ impl LevelSamples {
     /// Zero heights for a level of a grid.
     pub(super) fn new(grid: &Grid, level: u8) -> Self {
         let [rows, columns] = array_size(grid, level);
-        Self { rows, columns, values: vec![0; rows * columns], voids: None }
+        Self {
+            rows,
+            columns,
+            values: vec![0; rows * columns],
+            voids: None,
+        }
     }
 
     /// Heights of a tile, 129 × 129.
@@ -91,7 +104,10 @@ impl LevelSamples {
         let mut bits = vec![0_u8; TILE_SAMPLE_COUNT.div_ceil(8)];
         let mut count = 0;
         for index in 0..TILE_SAMPLE_COUNT {
-            if voids.get(first_row + index / TILE_SAMPLES, first_column + index % TILE_SAMPLES) {
+            if voids.get(
+                first_row + index / TILE_SAMPLES,
+                first_column + index % TILE_SAMPLES,
+            ) {
                 bits[index / 8] |= 1 << (index % 8);
                 count += 1;
             }
@@ -106,13 +122,23 @@ impl LevelSamples {
     pub(super) fn continue_past(&mut self, [rows, columns]: [usize; 2]) {
         let width = self.columns;
         for column in columns..width {
-            continue_column(&mut self.values[..rows * width], width, column, column - columns);
+            continue_column(
+                &mut self.values[..rows * width],
+                width,
+                column,
+                column - columns,
+            );
         }
         for row in rows..self.rows {
             let (done, rest) = self.values.split_at_mut(row * width);
             let last = &done[(row - 1) * width..];
             let before = &done[row.saturating_sub(2) * width..][..width];
-            let line = continued(row - rows, width, |place| last[place], |place| before[place]);
+            let line = continued(
+                row - rows,
+                width,
+                |place| last[place],
+                |place| before[place],
+            );
             rest[..width].copy_from_slice(&line);
         }
         if let Some(voids) = &mut self.voids {
@@ -139,7 +165,13 @@ impl LevelSamples {
     /// How many of the first rows' and columns' samples are void.
     pub(super) fn void_count(&self, [rows, columns]: [usize; 2]) -> u64 {
         let Some(voids) = &self.voids else { return 0 };
-        (0..rows).map(|row| (0..columns).filter(|column| voids.get(row, *column)).count() as u64).sum()
+        (0..rows)
+            .map(|row| {
+                (0..columns)
+                    .filter(|column| voids.get(row, *column))
+                    .count() as u64
+            })
+            .sum()
     }
 
     /// Remembers which samples hold `sentinel` as void and makes them 0.
@@ -149,7 +181,11 @@ impl LevelSamples {
         }
         let mut voids = BitGrid::new(self.rows, self.columns);
         for (row, line) in self.values.chunks_exact_mut(self.columns).enumerate() {
-            for (column, value) in line.iter_mut().enumerate().filter(|(_, value)| **value == sentinel) {
+            for (column, value) in line
+                .iter_mut()
+                .enumerate()
+                .filter(|(_, value)| **value == sentinel)
+            {
                 voids.set(row, column);
                 *value = 0;
             }
@@ -160,8 +196,15 @@ impl LevelSamples {
 
 /// Rows and columns of a level's array: whole tiles, an even number of them unless the level is the coarsest.
 pub(super) fn array_size(grid: &Grid, level: u8) -> [usize; 2] {
-    let even = |count: u32| if level == 0 { count } else { count.next_multiple_of(2) };
-    grid.tiles(level).map(|count| even(count) as usize * TILE_CELLS + 1)
+    let even = |count: u32| {
+        if level == 0 {
+            count
+        } else {
+            count.next_multiple_of(2)
+        }
+    };
+    grid.tiles(level)
+        .map(|count| even(count) as usize * TILE_CELLS + 1)
 }
 
 /// The finer samples under a coarser sample's hat.
@@ -173,18 +216,36 @@ fn hat(coarse: usize, finer_count: usize) -> impl Iterator<Item = usize> {
 fn continue_column(values: &mut [i32], width: usize, column: usize, distance: usize) {
     let rows = values.len() / width;
     let before = column.saturating_sub(2);
-    let line = continued(distance, rows, |row| values[row * width + column - 1], |row| values[row * width + before]);
+    let line = continued(
+        distance,
+        rows,
+        |row| values[row * width + column - 1],
+        |row| values[row * width + before],
+    );
     for (row, height) in line.into_iter().enumerate() {
         values[row * width + column] = height;
     }
 }
 
 /// One more line past the border: the last one smoothed along itself, plus half its smoothed slope.
-fn continued(distance: usize, len: usize, last: impl Fn(usize) -> i32, before: impl Fn(usize) -> i32) -> Vec<i32> {
+fn continued(
+    distance: usize,
+    len: usize,
+    last: impl Fn(usize) -> i32,
+    before: impl Fn(usize) -> i32,
+) -> Vec<i32> {
     // Whole units: past some lines the slope is rounding and no more.
-    let slope = |place: usize| if distance < 8 { (last(place) - before(place)) / 2 } else { 0 };
+    let slope = |place: usize| {
+        if distance < 8 {
+            (last(place) - before(place)) / 2
+        } else {
+            0
+        }
+    };
     let around = |place: usize| [place.saturating_sub(1), place, (place + 1).min(len - 1)];
-    (0..len).map(|place| weigh(around(place).map(&last)) + weigh(around(place).map(slope))).collect()
+    (0..len)
+        .map(|place| weigh(around(place).map(&last)) + weigh(around(place).map(slope)))
+        .collect()
 }
 
 /// (1, 2, 1) / 4, rounded.
@@ -192,7 +253,11 @@ fn weigh([a, b, c]: [i32; 3]) -> i32 {
     (a + 2 * b + c + 2) >> 2
 }
 
-fn continue_voids(voids: &mut BitGrid, [rows, columns]: [usize; 2], [all_rows, all_columns]: [usize; 2]) {
+fn continue_voids(
+    voids: &mut BitGrid,
+    [rows, columns]: [usize; 2],
+    [all_rows, all_columns]: [usize; 2],
+) {
     for row in 0..all_rows {
         let first = if row < rows { columns } else { 0 };
         for column in first..all_columns {
@@ -208,7 +273,12 @@ mod tests {
     use super::*;
 
     fn grid(rows: u32, columns: u32) -> Grid {
-        Grid { columns, rows, origin: [0.0, 0.0], step: [1.0, -1.0] }
+        Grid {
+            columns,
+            rows,
+            origin: [0.0, 0.0],
+            step: [1.0, -1.0],
+        }
     }
 
     #[test]
@@ -224,7 +294,8 @@ mod tests {
         let mut level = LevelSamples::new(&grid(200, 200), 1);
         for row in 0..200 {
             for column in 0..200 {
-                level.values[row * level.columns + column] = 16 * i32::try_from(row + column).unwrap();
+                level.values[row * level.columns + column] =
+                    16 * i32::try_from(row + column).unwrap();
             }
         }
         level.continue_past([200, 200]);

@@ -25,27 +25,52 @@ impl Scale {
     ///
     /// # Errors
     /// [`PyramidError::Refused`] for a bound or unit out of range or that do not go together.
-    pub(super) fn new(eps: Option<f64>, unit: Option<f64>, integer: bool) -> Result<Self, PyramidError> {
+    pub(super) fn new(
+        eps: Option<f64>,
+        unit: Option<f64>,
+        integer: bool,
+    ) -> Result<Self, PyramidError> {
         let undone = eps.is_none() && integer;
         // 15/32 m: units of 1/32 m and fifteen of them either way.
         let eps = eps.unwrap_or(if integer { 0.468_75 } else { 0.1 });
         if !(1e-6..=1e6).contains(&eps) {
-            return refuse(format!("an error bound of {eps} m is outside 0.000001 to 1,000,000 m"));
+            return refuse(format!(
+                "an error bound of {eps} m is outside 0.000001 to 1,000,000 m"
+            ));
         }
         let unit = unit.unwrap_or_else(|| (eps / 8.0).log2().floor().exp2());
         let exponent = unit.log2();
         if !(-24.0..=16.0).contains(&exponent) || exponent.fract() != 0.0 {
-            return refuse(format!("a unit of {unit} m is not a power of two from 2^-24 to 2^16 m"));
+            return refuse(format!(
+                "a unit of {unit} m is not a power of two from 2^-24 to 2^16 m"
+            ));
         }
-        let rounding = if integer && unit <= 1.0 { 0.0 } else { unit / 2.0 };
-        let half = if undone && unit <= 0.5 { 0.5 / unit - 1.0 } else { ((eps - rounding) / unit).floor() };
+        let rounding = if integer && unit <= 1.0 {
+            0.0
+        } else {
+            unit / 2.0
+        };
+        let half = if undone && unit <= 0.5 {
+            0.5 / unit - 1.0
+        } else {
+            ((eps - rounding) / unit).floor()
+        };
         if half < 0.0 {
-            return refuse(format!("a unit of {unit} m is too coarse for an error bound of {eps} m"));
+            return refuse(format!(
+                "a unit of {unit} m is too coarse for an error bound of {eps} m"
+            ));
         }
         let half = half.min(MAX_HALF_STEP);
         let eps = if undone { half * unit + rounding } else { eps };
-        #[expect(clippy::cast_possible_truncation, reason = "whole numbers, checked above")]
-        Ok(Self { unit_exponent: exponent as i32, step: 2 * half as i32 + 1, eps })
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "whole numbers, checked above"
+        )]
+        Ok(Self {
+            unit_exponent: exponent as i32,
+            step: 2 * half as i32 + 1,
+            eps,
+        })
     }
 
     /// One unit in metres.
@@ -84,7 +109,10 @@ mod tests {
     #[test]
     fn whole_metres_come_back_by_default() {
         let scale = Scale::new(None, None, true).unwrap();
-        assert_eq!((scale.unit(), scale.step, scale.eps), (1.0 / 32.0, 31, 0.468_75));
+        assert_eq!(
+            (scale.unit(), scale.step, scale.eps),
+            (1.0 / 32.0, 31, 0.468_75)
+        );
         assert!(f64::from(scale.step / 2) * scale.unit() < 0.5);
         let finer = Scale::new(None, Some(1.0 / 256.0), true).unwrap();
         assert_eq!((finer.step, finer.eps), (255, 127.0 / 256.0));
@@ -92,7 +120,13 @@ mod tests {
 
     #[test]
     fn nonsense_is_refused() {
-        for (eps, unit) in [(Some(0.0), None), (Some(f64::NAN), None), (Some(-1.0), None), (None, Some(0.3)), (Some(0.1), Some(1.0))] {
+        for (eps, unit) in [
+            (Some(0.0), None),
+            (Some(f64::NAN), None),
+            (Some(-1.0), None),
+            (None, Some(0.3)),
+            (Some(0.1), Some(1.0)),
+        ] {
             assert!(Scale::new(eps, unit, false).is_err(), "{eps:?} {unit:?}");
         }
     }
