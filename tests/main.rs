@@ -1,3 +1,4 @@
 //! End-to-end tests, one binary.
 
 mod layers;
+mod shared_structs;
