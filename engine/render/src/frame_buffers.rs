@@ -4,8 +4,7 @@
 
 use drumlin_core::{
     geo::PATCH_COUNT,
-    reference::shared::{DrawnTile, Frame},
-    terrain::FramePlan,
+    reference::shared::{DrawnTile, FLAG_SRGB_OUT, Frame},
 };
 
 use crate::{readback::Readback, vram::VramPlan};
@@ -21,6 +20,8 @@ pub(crate) struct FrameBuffers {
     pub(crate) drawn: wgpu::Buffer,
     /// A depth a patch: written by `depth`.
     pub(crate) depths: wgpu::Buffer,
+    /// Raised depths a patch: written and read by `balance`.
+    pub(crate) raised: wgpu::Buffer,
     /// A word a patch: written by `balance`.
     pub(crate) patches: wgpu::Buffer,
     /// The emitted indices.
@@ -69,6 +70,7 @@ impl FrameBuffers {
                 Usage::STORAGE | Usage::COPY_DST,
             ),
             depths: buffer(device, "drumlin depths", patches, written),
+            raised: buffer(device, "drumlin raised depths", patches, written),
             patches: buffer(device, "drumlin patches", patches, written),
             indices: buffer(
                 device,
@@ -90,18 +92,26 @@ impl FrameBuffers {
     }
 
     /// Writes the frame and its drawn tiles; a list past the capacity is cut, which the planner never lets happen.
-    pub(crate) fn write(&mut self, queue: &wgpu::Queue, plan: &FramePlan, frame: &Frame) {
-        let count = plan.drawn.len().min(self.capacity as usize);
+    pub(crate) fn write(
+        &mut self,
+        queue: &wgpu::Queue,
+        drawn: &[DrawnTile],
+        frame: &Frame,
+        srgb_out: bool,
+    ) {
+        let count = drawn.len().min(self.capacity as usize);
+        debug_assert_eq!(count, drawn.len(), "the planner knows the capacity");
         self.drawn_count = u32::try_from(count).unwrap_or(self.capacity);
-        debug_assert_eq!(count, plan.drawn.len(), "the planner knows the capacity");
+        let encode = if srgb_out { FLAG_SRGB_OUT } else { 0 };
         let frame = Frame {
             drawn_count: self.drawn_count,
             index_capacity: self.index_capacity(),
+            flags: frame.flags & !FLAG_SRGB_OUT | encode,
             ..*frame
         };
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
         if count > 0 {
-            queue.write_buffer(&self.drawn, 0, bytemuck::cast_slice(&plan.drawn[..count]));
+            queue.write_buffer(&self.drawn, 0, bytemuck::cast_slice(&drawn[..count]));
         }
     }
 
@@ -137,6 +147,7 @@ impl FrameBuffers {
             &self.frame,
             &self.drawn,
             &self.depths,
+            &self.raised,
             &self.patches,
             &self.indices,
             &self.draw_list,

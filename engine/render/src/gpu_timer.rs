@@ -1,7 +1,7 @@
 //! GPU times from timestamp queries, where the device has them; read frames later, never waited for.
 //!
-//! Two spans a frame: the stages (from the first compute pass to the last) and the caller's render pass, if the caller
-//! puts [`GpuTimer::pass_writes`] into it. A span that was not written is not resolved.
+//! Two spans a frame: the stages (one compute pass) and the caller's render pass, if the caller
+//! puts `pass_writes` into it. A span that was not written is not resolved.
 
 use crate::readback::Readback;
 
@@ -75,17 +75,13 @@ impl GpuTimer {
         }
     }
 
-    /// What the first and the last compute pass of a frame write.
-    pub(crate) fn stage_writes(
-        &self,
-        first: bool,
-        last: bool,
-    ) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
-        (first || last).then_some(wgpu::ComputePassTimestampWrites {
+    /// What the compute pass of the stages writes.
+    pub(crate) fn stage_writes(&self) -> wgpu::ComputePassTimestampWrites<'_> {
+        wgpu::ComputePassTimestampWrites {
             query_set: &self.queries,
-            beginning_of_pass_write_index: first.then_some(STAGES),
-            end_of_pass_write_index: last.then_some(STAGES + 1),
-        })
+            beginning_of_pass_write_index: Some(STAGES),
+            end_of_pass_write_index: Some(STAGES + 1),
+        }
     }
 
     /// Marks the frame's stages as encoded.

@@ -9,6 +9,8 @@ mod limits;
 pub mod offscreen;
 mod pool;
 mod readback;
+mod renderer;
+mod stages;
 mod staging;
 mod vram;
 
@@ -18,4 +20,6 @@ pub use gpu_timer::GpuTimes;
 pub use headless::Headless;
 pub use limits::check_limits;
 pub use offscreen::Offscreen;
+pub use renderer::{Capacity, Renderer, RendererBuffers, RendererDescriptor};
+pub use stages::TargetFormats;
 pub use wgpu;

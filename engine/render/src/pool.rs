@@ -44,6 +44,11 @@ impl Pool {
         std::array::from_fn(|index| self.pages.get(index).unwrap_or(&self.unused))
     }
 
+    /// The pages there are.
+    pub(crate) fn pages(&self) -> &[wgpu::Buffer] {
+        &self.pages
+    }
+
     /// The page of a slot and the slot's place in it.
     pub(crate) fn place(&self, slot: u32) -> Option<(usize, u32)> {
         let page = (slot / SLOTS_PER_PAGE) as usize;

@@ -25,8 +25,9 @@ pub(crate) const UPLOADS_PER_FRAME: u32 = 16;
 pub(crate) const UPLOAD_BYTES: u64 = 76 << 10;
 /// Uniforms, arguments, counters and their way back.
 const FIXED_BYTES: u64 = 16 << 10;
-/// Bytes a drawn tile takes in the lists beside its indices: itself, and depths and patch words of 1,024 patches.
-const DRAWN_BYTES: u64 = size_of::<DrawnTile>() as u64 + 2 * 4096;
+/// Bytes a drawn tile takes in the lists beside its indices: itself, and three words
+/// for each of its 1,024 patches.
+const DRAWN_BYTES: u64 = size_of::<DrawnTile>() as u64 + 3 * 4096;
 /// Least tiles a view can be drawn with: a root and a cut a few levels deep.
 const SLOTS_MIN: u64 = 64;
 
@@ -82,7 +83,7 @@ impl VramPlan {
             + u64::from(self.layers.max(1)) * LAYER_BYTES
             + u64::from(self.drawn) * DRAWN_BYTES
             + u64::from(self.indices) * 4
-            + u64::from(UPLOADS_PER_FRAME) * UPLOAD_BYTES
+            + 2 * u64::from(UPLOADS_PER_FRAME) * UPLOAD_BYTES
             + size_of::<Frame>() as u64
             + FIXED_BYTES
     }

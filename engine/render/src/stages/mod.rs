@@ -9,7 +9,12 @@ pub(crate) mod depth;
 pub(crate) mod draw;
 pub(crate) mod emit;
 
+pub use draw::TargetFormats;
+
 use crate::vram::PAGE_COUNT;
+
+/// Workgroups of 64 threads for the patches of a tile.
+const PATCH_GROUPS: u32 = 16;
 
 /// Layouts all stages after `decode` share.
 pub(crate) struct SharedLayouts {
@@ -24,8 +29,13 @@ impl SharedLayouts {
     pub(crate) fn new(device: &wgpu::Device) -> Self {
         let seen = wgpu::ShaderStages::VERTEX_FRAGMENT | wgpu::ShaderStages::COMPUTE;
         let frame = layout(device, "drumlin frame", &[uniform(0, seen)]);
-        let tiles: Vec<_> = (0..=PAGE_COUNT).map(|binding| storage(binding, Access::Read, seen)).collect();
-        Self { frame, tiles: layout(device, "drumlin tiles", &tiles) }
+        let tiles: Vec<_> = (0..=PAGE_COUNT)
+            .map(|binding| storage(binding, Access::Read, seen))
+            .collect();
+        Self {
+            frame,
+            tiles: layout(device, "drumlin tiles", &tiles),
+        }
     }
 }
 
@@ -39,8 +49,14 @@ pub(crate) enum Access {
 }
 
 /// A storage buffer's entry of a layout.
-pub(crate) fn storage(binding: u32, access: Access, visibility: wgpu::ShaderStages) -> wgpu::BindGroupLayoutEntry {
-    let ty = wgpu::BufferBindingType::Storage { read_only: access == Access::Read };
+pub(crate) fn storage(
+    binding: u32,
+    access: Access,
+    visibility: wgpu::ShaderStages,
+) -> wgpu::BindGroupLayoutEntry {
+    let ty = wgpu::BufferBindingType::Storage {
+        read_only: access == Access::Read,
+    };
     buffer_entry(binding, ty, visibility)
 }
 
@@ -57,7 +73,11 @@ fn buffer_entry(
     wgpu::BindGroupLayoutEntry {
         binding,
         visibility,
-        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
+        ty: wgpu::BindingType::Buffer {
+            ty,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
         count: None,
     }
 }
@@ -68,11 +88,18 @@ pub(crate) fn layout(
     label: &str,
     entries: &[wgpu::BindGroupLayoutEntry],
 ) -> wgpu::BindGroupLayout {
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some(label),
+        entries,
+    })
 }
 
 /// The layout of a stage that writes `written` of its own buffers, in binding order.
-pub(crate) fn own_layout(device: &wgpu::Device, label: &str, buffers: &[Access]) -> wgpu::BindGroupLayout {
+pub(crate) fn own_layout(
+    device: &wgpu::Device,
+    label: &str,
+    buffers: &[Access],
+) -> wgpu::BindGroupLayout {
     let entries: Vec<_> = (0..)
         .zip(buffers)
         .map(|(binding, &access)| storage(binding, access, wgpu::ShaderStages::COMPUTE))
@@ -89,15 +116,24 @@ pub(crate) fn group(
 ) -> wgpu::BindGroup {
     let entries: Vec<_> = (0..)
         .zip(buffers)
-        .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+        .map(|(binding, buffer)| wgpu::BindGroupEntry {
+            binding,
+            resource: buffer.as_entire_binding(),
+        })
         .collect();
-    device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
+    device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some(label),
+        layout,
+        entries: &entries,
+    })
 }
 
 /// The shader module of a stage.
-pub(crate) fn module(device: &wgpu::Device, name: &str, text: String) -> wgpu::ShaderModule {
+pub(crate) fn module(device: &wgpu::Device, stage: &str) -> wgpu::ShaderModule {
+    // A stage that does not exist becomes an empty module, which the device refuses by its label.
+    let text = drumlin_shaders::stage(stage).unwrap_or_default();
     device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(name),
+        label: Some(stage),
         source: wgpu::ShaderSource::Wgsl(text.into()),
     })
 }
@@ -122,4 +158,14 @@ pub(crate) fn pipeline(
         compilation_options: wgpu::PipelineCompilationOptions::default(),
         cache: None,
     })
+}
+
+/// Runs a kernel with one thread a patch over `drawn` tiles.
+pub(crate) fn per_patch(
+    pass: &mut wgpu::ComputePass<'_>,
+    kernel: &wgpu::ComputePipeline,
+    drawn: u32,
+) {
+    pass.set_pipeline(kernel);
+    pass.dispatch_workgroups(PATCH_GROUPS, drawn, 1);
 }
