@@ -125,3 +125,14 @@ fn owned_vertex(tile: u32, row: u32, column: u32) -> u32 {
     let sample = select(along * TILE_SAMPLES + across, across * TILE_SAMPLES + along, is_horizontal(edges));
     return ((word & SIDE_INDEX_MASK) << SAMPLE_BITS) | sample;
 }
+
+// Place of a skirt vertex (row, column), counted clockwise from the north-west corner.
+fn skirt_sample(place: u32) -> vec2u {
+    let along = place % TILE_CELLS;
+    switch place / TILE_CELLS {
+        case 0u: { return vec2u(0u, along); }
+        case 1u: { return vec2u(along, TILE_CELLS); }
+        case 2u: { return vec2u(TILE_CELLS, TILE_CELLS - along); }
+        default: { return vec2u(TILE_CELLS - along, 0u); }
+    }
+}

@@ -16,6 +16,8 @@ pub const SHARED: &[(&str, &str)] = &[
     ("tile", include_str!("../shared/tile.wgsl")),
     ("pool", include_str!("../shared/pool.wgsl")),
     ("border", include_str!("../shared/border.wgsl")),
+    ("ground", include_str!("../shared/ground.wgsl")),
+    ("colors", include_str!("../shared/colors.wgsl")),
     ("patch_word", include_str!("../shared/patch_word.wgsl")),
     ("draw_list", include_str!("../shared/draw_list.wgsl")),
     ("upload", include_str!("../shared/upload.wgsl")),

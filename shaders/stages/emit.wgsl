@@ -183,17 +183,6 @@ fn block_of_four(nw: vec2u, whole: u32) {
     }
 }
 
-// Place of a skirt vertex, counted clockwise from the north-west corner.
-fn skirt_sample(place: u32) -> vec2u {
-    let along = place % TILE_CELLS;
-    switch place / TILE_CELLS {
-        case 0u: { return vec2u(0u, along); }
-        case 1u: { return vec2u(along, TILE_CELLS); }
-        case 2u: { return vec2u(TILE_CELLS, TILE_CELLS - along); }
-        default: { return vec2u(TILE_CELLS - along, 0u); }
-    }
-}
-
 // The first place, clockwise, of a patch's part of a side.
 fn skirt_start(patch_index: u32, edge: u32) -> u32 {
     let row = patch_index / TILE_QUADS * QUAD_SAMPLES;
