@@ -6,3 +6,4 @@ pub mod depth;
 pub mod draw;
 pub mod emit;
 pub mod shared;
+pub mod synthetic;

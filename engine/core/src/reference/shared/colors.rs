@@ -56,11 +56,7 @@ pub fn depth_color(depth: u32, level: u32) -> Vec3 {
 #[must_use]
 pub fn encode_srgb(linear: Vec3) -> Vec3 {
     let encode = |x: f32| {
-        if x <= 0.003_130_8 {
-            12.92 * x
-        } else {
-            1.055 * x.max(0.0).powf(1.0 / 2.4) - 0.055
-        }
+        if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.max(0.0).powf(1.0 / 2.4) - 0.055 }
     };
     Vec3::new(encode(linear.x), encode(linear.y), encode(linear.z))
 }
