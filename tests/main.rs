@@ -1,3 +1,5 @@
 //! End-to-end tests, one binary.
 
+mod gpu_parity;
 mod layers;
+mod shared_structs;

@@ -42,59 +42,69 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
     let path = bytes.path();
     let damaged = |what: String| DemError::format(path, format!("USGS DEM: {what}"));
     let crs = read_crs(&file).map_err(|what| DemError::unsupported(path, what))?;
-    let angle = if crs.kind == CrsKind::Geographic {
-        1.0 / 3600.0
-    } else {
-        1.0
-    };
     let resolution = [816, 828, 840].map(|at| real(&file, at, 12).filter(|value| *value > 0.0));
     let [Some(dx), Some(dy), Some(dz)] = resolution else {
         return Err(damaged("no resolution at byte 817".into()));
     };
     let profiles = read_profiles(&file, dz).map_err(damaged)?;
-    let heights = profiles.iter().flat_map(|profile| &profile.heights);
+    let (north, rows) = north_and_rows(&profiles, dy).map_err(damaged)?;
+    check_size(path, profiles.len() as u64, rows.into(), 8)?;
+    let samples = spread(&profiles, north, dy, rows).map_err(damaged)?;
+
+    let is_whole = |height: &f64| height.is_nan() || height.fract() == 0.0;
     let unit = if integer(&file, 534) == Some(1) {
         FOOT
     } else {
         1.0
     };
-    let scaling = Scaling::new(options.nodata, options.scale.unwrap_or(unit), 0.0);
-    let whole = heights
-        .filter(|height| !height.is_nan())
-        .all(|height| height.fract() == 0.0);
+    let angle = if crs.kind == CrsKind::Geographic {
+        1.0 / 3600.0
+    } else {
+        1.0
+    };
+    let origin = [profiles[0].start[0], north].map(|place| place * angle);
+    let parts = Parts {
+        columns: u32::try_from(profiles.len()).unwrap_or(u32::MAX),
+        rows,
+        placement: Some(Placement {
+            origin,
+            step: [dx * angle, -dy * angle],
+        }),
+        crs,
+        whole: samples.iter().all(is_whole),
+        scaling: Scaling::new(options.nodata, options.scale.unwrap_or(unit), 0.0),
+    };
+    Memory::raster(bytes, options, parts, Samples::F64(samples))
+}
 
-    let west = profiles[0].start[0];
-    let ends = profiles
-        .iter()
-        .map(|profile| profile.start[1] + dy * (profile.heights.len() as f64 - 1.0));
-    let north = ends.fold(f64::MIN, f64::max);
+/// The northmost sample of all profiles, and the rows from there to the southmost.
+fn north_and_rows(profiles: &[Profile], dy: f64) -> Result<(f64, u32), String> {
+    let end = |profile: &Profile| profile.start[1] + dy * (profile.heights.len() as f64 - 1.0);
+    let north = profiles.iter().map(end).fold(f64::MIN, f64::max);
     let south = profiles
         .iter()
         .map(|profile| profile.start[1])
         .fold(f64::MAX, f64::min);
     let rows = ((north - south) / dy).round() + 1.0;
-    let columns = profiles.len() as u64;
     if !(1.0..=1e6).contains(&rows) {
-        return Err(damaged(format!(
-            "profiles from {south} to {north} in steps of {dy}"
-        )));
+        return Err(format!("profiles from {south} to {north} in steps of {dy}"));
     }
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "from 1 to a million"
     )]
-    let rows = rows as u32;
-    check_size(path, columns, rows.into(), 8)?;
-    let columns = u32::try_from(columns).unwrap_or(u32::MAX);
-    let mut samples = vec![f64::NAN; columns as usize * rows as usize];
+    Ok((north, rows as u32))
+}
+
+/// The heights of profiles on a grid, a profile a column; void where a profile does not reach.
+fn spread(profiles: &[Profile], north: f64, dy: f64, rows: u32) -> Result<Vec<f64>, String> {
+    let columns = profiles.len();
+    let mut samples = vec![f64::NAN; columns * rows as usize];
     for (column, profile) in profiles.iter().enumerate() {
         let start = (north - profile.start[1]) / dy;
-        if (start - start.round()).abs() > 0.01 || !(0.0..f64::from(rows)).contains(&start) {
-            return Err(damaged(format!(
-                "profile {} does not lie on the grid",
-                column + 1
-            )));
+        if (start - start.round()).abs() > 0.01 || !(0.0..f64::from(rows) - 0.5).contains(&start) {
+            return Err(format!("profile {} does not lie on the grid", column + 1));
         }
         #[expect(
             clippy::cast_possible_truncation,
@@ -103,22 +113,10 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
         )]
         let start = start.round() as usize;
         for (up, &height) in profile.heights.iter().enumerate().take(start + 1) {
-            samples[(start - up) * columns as usize + column] = height;
+            samples[(start - up) * columns + column] = height;
         }
     }
-    let placement = Placement {
-        origin: [west * angle, north * angle],
-        step: [dx * angle, -dy * angle],
-    };
-    let parts = Parts {
-        columns,
-        rows,
-        placement: Some(placement),
-        crs,
-        whole,
-        scaling,
-    };
-    Memory::raster(bytes, options, parts, Samples::F64(samples))
+    Ok(samples)
 }
 
 fn read_profiles(file: &[u8], dz: f64) -> Result<Vec<Profile>, String> {

@@ -205,3 +205,69 @@ fn changed_bytes_make_no_panic() {
         }
     }
 }
+
+#[test]
+fn absurd_sizes_are_refused_before_memory_is_taken() {
+    let folder = TempDir::new().expect("a folder");
+    let error = |name: &str, bytes: &[u8]| {
+        let opened = open(&save(&folder, name, bytes), &OpenOptions::default());
+        opened.err().expect(name).to_string()
+    };
+    let mut file = exr();
+    let key = b"dataWindow\0box2i\0\x10\0\0\0";
+    let window = file
+        .windows(key.len())
+        .position(|part| part == key)
+        .expect("an EXR")
+        + key.len();
+    for (max, said) in [
+        ([30_000, 30_000], "limit"),
+        ([9_999, 9_999], "in a file of"),
+        ([i32::MAX, -1], "EXR"),
+    ] {
+        for (value, at) in max.iter().zip([window + 8, window + 12]) {
+            file[at..at + 4].copy_from_slice(&i32::to_le_bytes(*value));
+        }
+        let error = error("a.exr", &file);
+        assert!(error.contains(said), "{error}");
+    }
+
+    let text = "ncols 60000\nnrows 60000\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3";
+    assert!(error("a.asc", text.as_bytes()).contains("limit"));
+    let text = text.replace("60000", "9999");
+    assert!(error("a.asc", text.as_bytes()).contains("cannot hold"));
+
+    // A PNG of 100,000 x 100,000: the size and its checksum are right, the pixels are not there.
+    let mut file = png();
+    file[16..24].copy_from_slice(&[0, 1, 0x86, 0xa0, 0, 1, 0x86, 0xa0]);
+    let mut crc = u32::MAX;
+    for byte in &file[12..29] {
+        crc ^= u32::from(*byte);
+        for _ in 0..8 {
+            crc = (crc >> 1) ^ (0xedb8_8320 & 0u32.wrapping_sub(crc & 1));
+        }
+    }
+    file[29..33].copy_from_slice(&(!crc).to_be_bytes());
+    assert!(error("a.png", &file).contains("limit"));
+    let image = open_image(&save(&folder, "b.png", &file)).expect_err("too large");
+    assert!(image.to_string().contains("limit"), "{image}");
+}
+
+#[test]
+fn options_that_make_no_grid_are_refused() {
+    let folder = TempDir::new().expect("a folder");
+    let path = save(&folder, "map.png", &png());
+    for (spacing, scale) in [
+        (0.0, 1.0),
+        (f64::NAN, 1.0),
+        (1.0, 0.0),
+        (1.0, f64::INFINITY),
+    ] {
+        let options = OpenOptions {
+            spacing: Some(spacing),
+            scale: Some(scale),
+            ..OpenOptions::default()
+        };
+        assert!(open(&path, &options).is_err(), "{spacing} {scale}");
+    }
+}

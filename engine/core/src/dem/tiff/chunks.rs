@@ -1,0 +1,92 @@
+//! All strips or tiles of one image, decoded when a window asks for them and kept for a while.
+
+use std::ops::Range;
+
+use super::super::{DemError, Window, bytes::Bytes, cache::Cache, samples::Samples};
+use super::chunk::Coding;
+use super::table::Table;
+
+/// The strips or tiles of an image of one band.
+pub(super) struct Chunks {
+    pub(super) coding: Coding,
+    pub(super) table: Table,
+    cache: Cache,
+}
+
+/// A row of samples that a window and a strip or tile share.
+pub(super) struct Run<'a> {
+    /// The decoded strip or tile; none where the file leaves it out.
+    pub(super) part: Option<&'a Samples>,
+    /// The first sample's index in it.
+    pub(super) in_part: usize,
+    /// The samples' indices in the window.
+    pub(super) in_window: Range<usize>,
+}
+
+impl Chunks {
+    pub(super) fn new(coding: Coding, table: Table, cache_bytes: usize) -> Self {
+        Self {
+            coding,
+            table,
+            cache: Cache::new(cache_bytes),
+        }
+    }
+
+    /// Visits every sample of a stored window once, in rows.
+    pub(super) fn visit(
+        &self,
+        bytes: &Bytes,
+        window: Window,
+        mut visit: impl FnMut(Run<'_>),
+    ) -> Result<(), DemError> {
+        if window.sample_count() == 0 {
+            return Ok(());
+        }
+        let (rows, columns) = (self.table.chunk_rows, self.table.chunk_columns);
+        for row in window.row / rows..=(window.row + window.rows - 1) / rows {
+            for column in window.column / columns..=(window.column + window.columns - 1) / columns {
+                self.visit_chunk(bytes, [row, column], window, &mut visit)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn visit_chunk(
+        &self,
+        bytes: &Bytes,
+        [row, column]: [u32; 2],
+        window: Window,
+        visit: &mut impl FnMut(Run<'_>),
+    ) -> Result<(), DemError> {
+        let (rows, columns) = (self.table.chunk_rows, self.table.chunk_columns);
+        let index = row as usize * self.table.across() as usize + column as usize;
+        let decode = |place| self.table.decode(bytes, &self.coding, index, place);
+        let part = match self.table.place(index) {
+            Some(place) => Some(self.cache.get(index, || decode(place))?),
+            None => None,
+        };
+        let first = [
+            row as usize * rows as usize,
+            column as usize * columns as usize,
+        ];
+        let shared_rows = overlap(first[0], rows, window.row, window.rows);
+        let shared_columns = overlap(first[1], columns, window.column, window.columns);
+        for row in shared_rows {
+            let in_window = (row - window.row as usize) * window.columns as usize
+                + shared_columns.start
+                - window.column as usize;
+            visit(Run {
+                part: part.as_deref(),
+                in_part: (row - first[0]) * columns as usize + shared_columns.start - first[1],
+                in_window: in_window..in_window + shared_columns.len(),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Rows (or columns) that a chunk and a window share.
+fn overlap(first: usize, count: u32, window_first: u32, window_count: u32) -> Range<usize> {
+    let window_first = window_first as usize;
+    first.max(window_first)..(first + count as usize).min(window_first + window_count as usize)
+}
