@@ -44,6 +44,8 @@ impl Array {
 }
 
 /// A pyramid, open for reading from any number of threads.
+///
+/// One that is replaced on the disk while it is open must be opened again.
 #[derive(Debug)]
 pub struct Pyramid {
     store: Box<dyn Store>,
