@@ -75,7 +75,11 @@ pub const fn relation_of(word: u32) -> u32 {
 /// Which half of a coarser neighbour's side a tile lies at.
 #[must_use]
 pub const fn half_of(quadrant: u32, edge: u32) -> u32 {
-    if is_horizontal(edge) { quadrant & 1 } else { quadrant >> 1 }
+    if is_horizontal(edge) {
+        quadrant & 1
+    } else {
+        quadrant >> 1
+    }
 }
 
 /// Edges of a cell that lie on the border of its square of count × count cells.
@@ -94,7 +98,12 @@ fn patch_inside(tile: u32, patch: u32, edge: u32) -> Facing {
         EDGE_SOUTH => patch + TILE_QUADS,
         _ => patch - 1,
     };
-    Facing { relation: SIDE_SAME, tile, first: at, second: at }
+    Facing {
+        relation: SIDE_SAME,
+        tile,
+        first: at,
+        second: at,
+    }
 }
 
 /// The patch, or the two patches, across an edge.
@@ -108,8 +117,17 @@ pub fn facing(tiles: &[DrawnTile], tile: u32, patch: u32, edge: u32) -> Facing {
     let word = side_words(&tiles[tile as usize], edge)[(along / (TILE_QUADS / 2)) as usize];
     let relation = relation_of(word);
     match relation {
-        SIDE_NONE => return Facing { relation, tile, first: patch, second: patch },
-        SIDE_COARSER => along = half_of(tiles[tile as usize].quadrant, edge) * (TILE_QUADS / 2) + along / 2,
+        SIDE_NONE => {
+            return Facing {
+                relation,
+                tile,
+                first: patch,
+                second: patch,
+            };
+        }
+        SIDE_COARSER => {
+            along = half_of(tiles[tile as usize].quadrant, edge) * (TILE_QUADS / 2) + along / 2;
+        }
         SIDE_FINER => along = along % (TILE_QUADS / 2) * 2,
         _ => {}
     }
@@ -120,8 +138,17 @@ pub fn facing(tiles: &[DrawnTile], tile: u32, patch: u32, edge: u32) -> Facing {
         _ => along * TILE_QUADS + TILE_QUADS - 1,
     };
     let stride = if is_horizontal(edge) { 1 } else { TILE_QUADS };
-    let second = if relation == SIDE_FINER { first + stride } else { first };
-    Facing { relation, tile: word & SIDE_INDEX_MASK, first, second }
+    let second = if relation == SIDE_FINER {
+        first + stride
+    } else {
+        first
+    };
+    Facing {
+        relation,
+        tile: word & SIDE_INDEX_MASK,
+        first,
+        second,
+    }
 }
 
 /// The other patch of the same tile that faces the same coarser patch across an edge.
@@ -159,8 +186,11 @@ pub fn owned_vertex(tiles: &[DrawnTile], tile: u32, row: u32, column: u32) -> u3
     }
     // The same place is on the opposite border of the neighbour.
     let across = if is_north_or_west { TILE_CELLS } else { 0 };
-    let sample =
-        if is_horizontal(edges) { across * TILE_SAMPLES + along } else { along * TILE_SAMPLES + across };
+    let sample = if is_horizontal(edges) {
+        across * TILE_SAMPLES + along
+    } else {
+        along * TILE_SAMPLES + across
+    };
     (word & SIDE_INDEX_MASK) << SAMPLE_BITS | sample
 }
 
