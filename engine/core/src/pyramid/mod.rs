@@ -9,7 +9,7 @@ mod metadata;
 mod patch_code;
 mod record;
 #[cfg(test)]
-mod sample;
+pub(crate) mod sample;
 mod shard;
 pub mod surface;
 pub mod templates;

@@ -69,7 +69,7 @@ pub(super) fn metadata(rows: u32, columns: u32) -> Metadata {
 }
 
 /// Writes the small pyramid.
-pub(super) fn write(path: &Path, rows: u32, columns: u32) -> Metadata {
+pub(crate) fn write(path: &Path, rows: u32, columns: u32) -> Metadata {
     let metadata = metadata(rows, columns);
     let writer = PyramidWriter::create(path, false).unwrap();
     let shards = write_with(&writer, rows, columns);

@@ -22,6 +22,10 @@ pub(crate) struct Synthetic {
     pub(crate) delay: Duration,
     /// Of a hundred reads, how many fail.
     pub(crate) failures: u64,
+    /// Finest samples differ, but for those on tile borders.
+    pub(crate) rough: bool,
+    /// Finest samples that are void, by tile, row and column.
+    pub(crate) void: Option<fn(TileId, usize, usize) -> bool>,
     /// Reads so far.
     pub(crate) reads: AtomicU64,
 }
@@ -59,6 +63,8 @@ impl Synthetic {
             seed,
             delay: Duration::ZERO,
             failures: 0,
+            rough: false,
+            void: None,
             reads: AtomicU64::new(0),
         }
     }
@@ -122,10 +128,25 @@ impl Synthetic {
             children: id.children().map(|child| self.summary(child)),
             step: 1,
             controls: vec![800; CAGE_CONTROL_COUNT].into(),
-            detail: vec![0; TILE_SAMPLE_COUNT].into(),
+            detail: self.detail(id),
             patch_codes: vec![0; PATCH_COUNT].into(),
-            voids: None,
+            voids: self
+                .void
+                .filter(|_| id.level == self.metadata.finest())
+                .map(|void| bits(id, void)),
         }
+    }
+
+    fn detail(&self, id: TileId) -> Box<[i32]> {
+        let mut detail = vec![0; TILE_SAMPLE_COUNT];
+        if self.rough && id.level == self.metadata.finest() {
+            for (row, column) in (1..128).flat_map(|row| (1..128).map(move |column| (row, column)))
+            {
+                detail[row * 129 + column] =
+                    (self.hash(id, (row * 129 + column) as u64) % 61) as i32 - 30;
+            }
+        }
+        detail.into()
     }
 
     fn read(&self, id: TileId) -> Result<(), PyramidError> {
@@ -139,6 +160,14 @@ impl Synthetic {
         }
         Ok(())
     }
+}
+
+fn bits(id: TileId, void: fn(TileId, usize, usize) -> bool) -> Box<[u8]> {
+    let mut bits = vec![0; TILE_SAMPLE_COUNT.div_ceil(8)];
+    for at in (0..TILE_SAMPLE_COUNT).filter(|at| void(id, at / 129, at % 129)) {
+        bits[at / 8] |= 1 << (at % 8);
+    }
+    bits.into()
 }
 
 impl TileSource for Synthetic {

@@ -10,9 +10,17 @@ mod frame_plan;
 mod list;
 mod planner;
 mod pool;
+mod raycast;
+mod source;
 mod stats;
+mod surface;
+mod update;
 
 pub use frame_plan::{ColorUpload, FramePlan, Place, Upload};
 pub use planner::{Planner, PlannerDescriptor};
 pub use pool::PoolSizes;
+pub use raycast::Hit;
+pub use source::PyramidSource;
 pub use stats::FrameStats;
+pub use surface::{Collider, Surface};
+pub use update::{Planned, Updater};

@@ -169,6 +169,12 @@ impl Planner {
         self.scheduler.take_errors()
     }
 
+    /// The pool is empty: its device was lost. Tiles go there again from RAM, pictures are read again.
+    pub fn forget_uploads(&mut self) {
+        self.room.empty_slots(&mut self.tree);
+        self.colors.empty_layers(&mut self.tree);
+    }
+
     /// The plan of a view.
     pub fn plan(&mut self, view: &View) -> (FramePlan, FrameStats) {
         let mut plan = FramePlan::default();
