@@ -4,13 +4,16 @@
 
 use drumlin_core::{
     geo::PATCH_COUNT,
-    reference::shared::{DrawnTile, FLAG_SRGB_OUT, Frame},
+    reference::shared::{
+        CLASS_COUNTS_WORD, DRAW_LIST_WORDS, DrawnTile, FLAG_SRGB_OUT, Frame, INDEX_COUNT_WORD,
+        SHIFT_COUNTS_WORD,
+    },
 };
 
 use crate::{readback::Readback, vram::VramPlan};
 
-/// Words of the head of the emitted list: the draw's arguments first, then what was counted.
-const DRAW_LIST_WORDS: u64 = 16;
+/// Bytes of the head of the emitted list: the draw's arguments first, then what was counted.
+const DRAW_LIST_BYTES: u64 = DRAW_LIST_WORDS as u64 * 4;
 
 /// The lists of one view.
 pub(crate) struct FrameBuffers {
@@ -81,12 +84,12 @@ impl FrameBuffers {
             draw_list: buffer(
                 device,
                 "drumlin draw list",
-                DRAW_LIST_WORDS * 4,
+                DRAW_LIST_BYTES,
                 written | Usage::INDIRECT | Usage::COPY_DST,
             ),
             capacity: plan.drawn,
             drawn_count: 0,
-            counts: Readback::new(device, "drumlin counts", DRAW_LIST_WORDS * 4),
+            counts: Readback::new(device, "drumlin counts", DRAW_LIST_BYTES),
             latest: None,
         }
     }
@@ -118,7 +121,7 @@ impl FrameBuffers {
     /// Sends the counters on their way to the CPU.
     pub(crate) fn record_counts(&mut self, encoder: &mut wgpu::CommandEncoder, frame: u64) {
         if let Some(buffer) = self.counts.record(encoder, frame) {
-            encoder.copy_buffer_to_buffer(&self.draw_list, 0, buffer, 0, DRAW_LIST_WORDS * 4);
+            encoder.copy_buffer_to_buffer(&self.draw_list, 0, buffer, 0, DRAW_LIST_BYTES);
         }
     }
 
@@ -177,15 +180,15 @@ fn buffer(
 fn parse_counts(frame: u64, bytes: &[u8], capacity: u32) -> DrawCounts {
     let (words, _) = bytes.as_chunks::<4>();
     let word = |index: usize| words.get(index).map_or(0, |word| u32::from_le_bytes(*word));
-    let shift = (0..2)
-        .find(|&shift| word(5 + shift as usize) <= capacity)
-        .unwrap_or(2);
+    let classes: [u32; 6] = std::array::from_fn(|class| word(CLASS_COUNTS_WORD + class));
+    let [a, b, c, d, e, f] = classes;
+    let fits = |shift: &u32| word(SHIFT_COUNTS_WORD + *shift as usize) <= capacity;
     DrawCounts {
         frame,
-        triangles: word(0) / 3,
-        regular_patches: [word(9), word(10), word(11)],
-        transition_patches: [word(12), word(13), word(14)],
-        shift,
+        triangles: word(INDEX_COUNT_WORD) / 3,
+        regular_patches: [a, b, c],
+        transition_patches: [d, e, f],
+        shift: (0..2).find(fits).unwrap_or(2),
     }
 }
 

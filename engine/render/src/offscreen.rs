@@ -141,12 +141,7 @@ impl Offscreen {
     ) -> Result<Vec<u8>, RenderError> {
         let row_bytes = self.size[0] * TEXEL_BYTES;
         let pitch = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("drumlin picture"),
-            size: u64::from(pitch) * u64::from(self.size[1]),
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
+        let buffer = mappable(device, u64::from(pitch) * u64::from(self.size[1]));
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let layout = wgpu::TexelCopyBufferLayout {
             offset: 0,
@@ -162,7 +157,7 @@ impl Offscreen {
             texture.size(),
         );
         queue.submit([encoder.finish()]);
-        let bytes = read_buffer(device, &buffer)?;
+        let bytes = read_mappable(device, &buffer)?;
         Ok(bytes
             .chunks(pitch as usize)
             .flat_map(|row| &row[..row_bytes as usize])
@@ -171,28 +166,50 @@ impl Offscreen {
     }
 }
 
-/// The bytes of a mappable buffer, once the device has filled it; waits.
+/// The first bytes of a buffer that may be copied from; waits for the device.
 ///
 /// # Errors
 ///
 /// [`RenderError::Device`] when the device is lost.
-pub fn read_buffer(device: &wgpu::Device, buffer: &wgpu::Buffer) -> Result<Vec<u8>, RenderError> {
+pub fn read_buffer(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    source: &wgpu::Buffer,
+    byte_count: u64,
+) -> Result<Vec<u8>, RenderError> {
+    let buffer = mappable(device, byte_count);
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    encoder.copy_buffer_to_buffer(source, 0, &buffer, 0, byte_count);
+    queue.submit([encoder.finish()]);
+    read_mappable(device, &buffer)
+}
+
+fn mappable(device: &wgpu::Device, byte_count: u64) -> wgpu::Buffer {
+    device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("drumlin reading"),
+        size: byte_count.max(4),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    })
+}
+
+fn read_mappable(device: &wgpu::Device, buffer: &wgpu::Buffer) -> Result<Vec<u8>, RenderError> {
     let (sender, receiver) = std::sync::mpsc::channel();
     buffer.map_async(wgpu::MapMode::Read, .., move |result| {
         // The receiver lives until the poll below has run this.
         let _ = sender.send(result);
     });
+    let failed = |what: String| RenderError::Device(what);
     device
         .poll(wgpu::PollType::wait_indefinitely())
-        .map_err(|error| RenderError::Device(error.to_string()))?;
-    let lost = || RenderError::Device("a buffer could not be mapped".into());
-    receiver
+        .map_err(|error| failed(error.to_string()))?;
+    let mapped = receiver
         .recv()
-        .map_err(|_| lost())?
-        .map_err(|error| RenderError::Device(error.to_string()))?;
+        .map_err(|_| failed("a buffer could not be mapped".into()))?;
+    mapped.map_err(|error| failed(error.to_string()))?;
     let bytes = buffer
         .get_mapped_range(..)
-        .map_err(|error| RenderError::Device(error.to_string()))?
+        .map_err(|error| failed(error.to_string()))?
         .to_vec();
     buffer.unmap();
     Ok(bytes)

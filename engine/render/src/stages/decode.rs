@@ -2,12 +2,12 @@
 
 use drumlin_core::{
     geo::{PATCH_COUNT, TILE_SAMPLE_COUNT},
-    reference::shared::UploadHeader,
+    reference::shared::{UPLOAD_WORDS, UploadHeader},
 };
 
 use super::{Access, layout, module, pipeline, storage};
 use crate::{
-    staging::{Batch, Staging, UPLOAD_WORDS},
+    staging::{Batch, Staging},
     vram::UPLOADS_PER_FRAME,
 };
 
