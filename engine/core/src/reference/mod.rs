@@ -6,4 +6,3 @@ pub mod depth;
 pub mod draw;
 pub mod emit;
 pub mod shared;
-pub mod synthetic;
