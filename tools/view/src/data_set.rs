@@ -6,6 +6,8 @@ use anyhow::Result;
 use drumlin_core::{
     geo::{TILE_CELLS, TILE_SAMPLES, TileId, WorldFrame},
     pyramid::{Metadata, Pyramid, surface},
+    stream::TileSource,
+    terrain::PyramidSource,
 };
 use serde_json::{Value, json};
 
@@ -19,7 +21,7 @@ const GROUND_LEVEL: u8 = 2;
 
 /// An open pyramid.
 pub(crate) struct DataSet {
-    pub(crate) pyramid: Arc<Pyramid>,
+    pub(crate) source: Arc<PyramidSource>,
     name: String,
 }
 
@@ -31,13 +33,13 @@ impl DataSet {
             .to_string_lossy()
             .into_owned();
         Ok(Self {
-            pyramid: Arc::new(Pyramid::open(folder)?),
+            source: Arc::new(PyramidSource::open(folder)?),
             name,
         })
     }
 
     pub(crate) fn metadata(&self) -> &Metadata {
-        self.pyramid.metadata()
+        self.source.metadata()
     }
 
     pub(crate) fn frame(&self) -> WorldFrame {
@@ -56,7 +58,7 @@ impl DataSet {
         match file {
             Some(file) => path::read(file),
             None => {
-                let ground = Ground::read(&self.pyramid)?;
+                let ground = Ground::read(self.source.pyramid())?;
                 auto_path(&self.metadata().grid.extent(), &self.frame(), &|place| {
                     ground.height(place)
                 })

@@ -1,14 +1,10 @@
 //! A terrain on a device, with the looks this program gives it: sky, haze, and what the debug keys show.
 
-use std::sync::Arc;
-
 use anyhow::Result;
 use drumlin::{DrawCounts, GpuTimes, Renderer, RendererDescriptor, TargetFormats, wgpu};
 use drumlin_core::{
-    geo::TileId,
-    pyramid::{Metadata, Pyramid, PyramidError, Tile},
     reference::shared::{FLAG_DEPTH_COLORS, FLAG_DRAW_VOIDS, FLAG_WIREFRAME},
-    stream::{TileSource, View},
+    stream::View,
     terrain::{FramePlan, FrameStats, Planner, PlannerDescriptor},
 };
 
@@ -49,21 +45,8 @@ pub(crate) struct Scene {
     size: f64,
 }
 
-struct Source(Arc<Pyramid>);
-
-impl TileSource for Source {
-    fn metadata(&self) -> &Metadata {
-        self.0.metadata()
-    }
-    fn load(&self, id: TileId, parent: Option<&Tile>) -> Result<Tile, PyramidError> {
-        self.0.read_tile(id, parent.map(|parent| &*parent.controls))
-    }
-    fn load_color(&self, id: TileId) -> Result<Option<Arc<[u8]>>, PyramidError> {
-        Ok(self.0.read_color(id)?.map(Into::into))
-    }
-}
-
 impl Scene {
+    #[expect(clippy::cast_possible_truncation, reason = "a height unit is a power of two")]
     /// Opens a terrain that draws into pictures of a format, beside a depth buffer.
     pub(crate) fn open(
         data: &DataSet,
@@ -74,7 +57,7 @@ impl Scene {
         wait_for_tiles: bool,
     ) -> Result<Self> {
         let planner = Planner::new(
-            Arc::new(Source(Arc::clone(&data.pyramid))),
+            data.source.clone(),
             PlannerDescriptor {
                 ram_budget_bytes: arguments.ram_budget,
                 vram_budget_bytes: arguments.vram_budget / 3,
@@ -126,6 +109,7 @@ impl Scene {
         }
     }
 
+    #[expect(clippy::cast_possible_truncation, reason = "a haze of seven digits; an index list under 2^32 words")]
     /// Chooses what is drawn for a view; never waits, unless it was opened to.
     pub(crate) fn update(&mut self, view: &View, debug: Debug) {
         self.view = Some(*view);
