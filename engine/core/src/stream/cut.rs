@@ -209,14 +209,13 @@ fn parents_around(tree: &Tree, id: TileId) -> impl Iterator<Item = TileId> + use
         .checked_sub(1)
         .map_or([0, 0], |level| tree.grid().tiles(level));
     let near = |at: u32| {
-        [
-            Some(at / 2),
-            if at % 2 == 0 {
-                (at / 2).checked_sub(1)
-            } else {
-                Some(at / 2 + 1)
-            },
-        ]
+        let parent = at / 2;
+        let other = if at.is_multiple_of(2) {
+            parent.checked_sub(1)
+        } else {
+            Some(parent + 1)
+        };
+        [Some(parent), other]
     };
     let rows = near(id.row).map(|row| row.filter(|&row| row < rows));
     let columns = near(id.column).map(|column| column.filter(|&column| column < columns));

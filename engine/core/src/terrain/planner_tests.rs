@@ -6,7 +6,7 @@ use super::*;
 use crate::{
     geo::TileId,
     reference::shared::NONE,
-    stream::{mix, synthetic::Synthetic},
+    stream::{Retry, mix, synthetic::Synthetic},
 };
 
 /// A GPU's memory, as far as it matters: which tile each slot and which picture each layer holds.
@@ -133,7 +133,7 @@ impl Journey {
     fn next(&mut self) -> View {
         self.step += 1;
         self.heading += 0.1 * self.random();
-        if self.step % 40 == 0 {
+        if self.step.is_multiple_of(40) {
             self.at = [
                 4000.0 * self.random(),
                 3000.0 * self.random(),

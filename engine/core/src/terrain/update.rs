@@ -159,8 +159,11 @@ impl Updater {
     pub fn recycle(&mut self, plan: FramePlan) {
         match &mut self.pace {
             Pace::Stepped(_, spare) => *spare = Some(plan),
-            // When there is enough of it already, it goes.
-            Pace::Paced(worker) => drop(worker.as_ref().map(|worker| worker.spare.try_send(plan))),
+            Pace::Paced(Some(worker)) => {
+                // When there is enough of it already, it goes.
+                let _ = worker.spare.try_send(plan);
+            }
+            Pace::Paced(None) => {}
         }
     }
 }

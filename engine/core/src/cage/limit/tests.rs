@@ -380,3 +380,72 @@ fn a_pattern_gives_what_single_places_give() {
         }
     }
 }
+
+/// The disc with creases along some of the edges at its middle, out to the boundary.
+fn creased_disc(valence: u32, creases: &[u32], corner: &str) -> Cage {
+    let mut text = super::super::write_obj(&disc(valence, 0.0));
+    for crease in creases {
+        let (inner, outer) = (1 + 2 * crease, 1 + 2 * valence + 2 * crease);
+        text += &format!("t crease 2/1/0 0 {inner} 10\nt crease 2/1/0 {inner} {outer} 10\n");
+    }
+    parse(&(text + corner))
+}
+
+#[test]
+fn masks_at_a_vertex_are_the_limit_of_places_that_come_close() {
+    let cases: [(u32, &[u32], &str); 8] = [
+        (5, &[0, 2], ""),
+        (7, &[0, 3], ""),
+        (8, &[1, 4], ""),
+        (4, &[0, 1], ""),
+        (6, &[0, 1, 3], ""),
+        (5, &[2], ""),
+        (5, &[], "t corner 1/1/0 0 10\n"),
+        (5, &[0, 2], "t corner 1/1/0 0 2.5\n"),
+    ];
+    for (valence, creases, corner) in cases {
+        let cage = creased_disc(valence, creases, corner);
+        let surface = LimitSurface::new(&cage).unwrap();
+        for face in 0..valence {
+            let vertex = surface.evaluate(face, 0.0, 0.0).unwrap();
+            let tiny = 0.5_f64.powi(52);
+            let near = surface.evaluate(face, 0.6 * tiny, tiny).unwrap();
+            let case = format!("valence {valence}, creases {creases:?} {corner:?}, face {face}");
+            // The slowest ring shrinks to 0.66^52 of the cage.
+            assert!(distance(vertex.position, near.position) < 1e-8, "{case}");
+            // Sides of two and three quads have a tangent plane; with one the surface has a cusp, with four and more a
+            // second wave shrinks no faster than the crease. So have corners of several quads, and darts, none we know.
+            let side = match creases {
+                [a, b] if (a..b).contains(&&face) => b - a,
+                [a, b] => valence - (b - a),
+                _ => 0,
+            };
+            let settled = (2..=3).contains(&side);
+            let off = distance(vertex.normal, near.normal);
+            assert!(
+                !settled || off < 1e-3,
+                "{case}: {off:e} {vertex:?} {near:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn at_valence_two_the_tangent_runs_from_end_to_end() {
+    let pillow = parse("v -1 -1 0\nv 1 -1 0.1\nv 1 1 0\nv -1 1 0.1\nf 1 2 3 4\nf 4 3 2 1\n");
+    let surface = LimitSurface::new(&pillow).unwrap();
+    let sample = surface.evaluate(0, 0.0, 0.0).unwrap();
+    let [x, y, z] = sample.du;
+    // From vertex 3 to vertex 1: (2, -2, 0) times 4 / 6.
+    assert!(
+        (x - 4.0 / 3.0).abs() < 1e-12 && (y + 4.0 / 3.0).abs() < 1e-12 && z.abs() < 1e-12,
+        "{sample:?}"
+    );
+    assert!(
+        sample
+            .position
+            .iter()
+            .chain(&sample.normal)
+            .all(|x| x.is_finite())
+    );
+}
