@@ -2,7 +2,9 @@
 //!
 //! Every stage's reference gets what the device's stage before it made, so a difference shows where it arises.
 
-use drumlin::{Headless, Offscreen, Renderer, RendererDescriptor, TargetFormats, offscreen, wgpu};
+use drumlin::{
+    Headless, Offscreen, PoolSizes, Renderer, RendererDescriptor, TargetFormats, offscreen, wgpu,
+};
 use drumlin_core::{
     geo::{PATCH_COUNT, TILE_SAMPLE_COUNT},
     reference::{
@@ -21,26 +23,16 @@ use drumlin_tests::scene::{self, Camera};
 const BACKGROUND: [f64; 4] = [1.0, 0.0, 1.0, 1.0];
 const SIZE: [u32; 2] = [640, 360];
 
-/// A device; none, said aloud, where there is no adapter and `REQUIRE_GPU` does not insist.
-fn gpu() -> Option<Headless> {
-    match Headless::new() {
-        Ok(gpu) => Some(gpu),
-        Err(error) if std::env::var("REQUIRE_GPU").is_ok_and(|value| value == "1") => {
-            panic!("{error}")
-        }
-        Err(error) => {
-            println!("skipped: {error}");
-            None
-        }
-    }
-}
-
 fn renderer(gpu: &Headless) -> Renderer {
     let descriptor = RendererDescriptor {
         formats: TargetFormats::default(),
-        vram_budget_bytes: 20 << 20,
+        sizes: PoolSizes {
+            slots: 64,
+            color_layers: 0,
+            max_drawn: 64,
+            index_capacity: 655_360,
+        },
         unit: scene::UNIT,
-        imagery: false,
     };
     Renderer::new(&gpu.device, &gpu.queue, &descriptor).expect("a renderer")
 }
@@ -231,7 +223,9 @@ fn completed(gpu_frame: &Frame, renderer: &Renderer) -> Frame {
 
 #[test]
 fn every_stage_does_what_its_reference_does() {
-    let Some(gpu) = gpu() else { return };
+    let Some(gpu) = drumlin_tests::gpu() else {
+        return;
+    };
     let mut renderer = renderer(&gpu);
     let cut = scene::mixed_cut();
     let mut plan = scene::plan(&Camera::over_the_hill(SIZE), &cut);
@@ -277,7 +271,9 @@ fn every_stage_does_what_its_reference_does() {
 
 #[test]
 fn voids_are_holes_and_only_there() {
-    let Some(gpu) = gpu() else { return };
+    let Some(gpu) = drumlin_tests::gpu() else {
+        return;
+    };
     let mut renderer = renderer(&gpu);
     let mut plan = scene::plan(&Camera::from_above(SIZE), &scene::mixed_cut());
     let first_drawn = plan.drawn[0].slot;
@@ -318,7 +314,9 @@ fn voids_are_holes_and_only_there() {
 
 #[test]
 fn a_hill_of_two_levels_has_no_holes() {
-    let Some(gpu) = gpu() else { return };
+    let Some(gpu) = drumlin_tests::gpu() else {
+        return;
+    };
     let mut renderer = renderer(&gpu);
     let plan = scene::plan(&Camera::over_the_hill(SIZE), &scene::mixed_cut());
     let picture = render(&gpu, &mut renderer, &plan);

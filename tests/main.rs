@@ -3,3 +3,4 @@
 mod gpu_parity;
 mod layers;
 mod shared_structs;
+mod terrain;

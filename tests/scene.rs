@@ -2,17 +2,18 @@
 //!
 //! The list of drawn tiles is put together here on its own, plainly and slowly, and so checks the planner's.
 
-use std::{collections::HashMap, sync::Arc};
+use std::{collections::HashMap, sync::Arc, time::Duration};
 
 use drumlin_core::{
     geo::{
-        CAGE_CONTROL_COUNT, CAGE_CONTROLS, PATCH_COUNT, QUAD_SAMPLES, TILE_CELLS,
+        CAGE_CONTROL_COUNT, CAGE_CONTROLS, Crs, Grid, PATCH_COUNT, QUAD_SAMPLES, TILE_CELLS,
         TILE_SAMPLE_COUNT, TILE_SAMPLES, TileId,
     },
-    pyramid::{Summary, Tile},
+    pyramid::{Level, Metadata, PyramidError, Summary, Tile, VerticalReference},
     reference::shared::{
         DrawnTile, Frame, NONE, SIDE_COARSER, SIDE_FINER, SIDE_SAME, TILE_VISIBLE,
     },
+    stream::TileSource,
     terrain::{FramePlan, Upload},
 };
 
@@ -198,6 +199,7 @@ pub fn plan(camera: &Camera, cut: &[TileId]) -> FramePlan {
         color_uploads: Vec::new(),
         frame: Some(frame(camera, cut.len())),
         drawn: drawn_tiles(camera, cut, &resident),
+        places: Vec::new(),
     }
 }
 
@@ -314,4 +316,76 @@ fn corner_owner(places: &HashMap<TileId, u32>, id: TileId, corner: u32) -> (u32,
     let sample = |axis: usize, place: u32| at[axis] / scale(owner.level) - u64::from(place) * cells;
     let sample = sample(0, owner.row) * TILE_SAMPLES as u64 + sample(1, owner.column);
     (places[owner], u32::try_from(sample).expect("a sample"))
+}
+
+/// The hill as a data set of three levels that can be streamed.
+pub struct HillSource {
+    metadata: Metadata,
+    delay: Duration,
+}
+
+/// Geometric errors of the levels, metres: generous, and none at the finest.
+const ERRORS: [f32; 3] = [12.0, 4.0, 0.0];
+
+impl HillSource {
+    /// The whole hill, each of whose reads takes so long.
+    #[must_use]
+    pub fn new(delay: Duration) -> Self {
+        let grid = Grid {
+            columns: 513,
+            rows: 513,
+            origin: [0.0, 0.0],
+            step: [step(2), -step(2)],
+        };
+        let level = |level| Level {
+            tiles: grid.tiles(level),
+            step: QUANTUM,
+            key: level == 0,
+            cage_bytes: 4,
+            detail_bytes: 1,
+            voids: false,
+        };
+        let metadata = Metadata {
+            version: Metadata::VERSION,
+            grid,
+            crs: Crs::unknown(),
+            vertical: VerticalReference::Unknown,
+            unit_exponent: -3,
+            eps: 0.1,
+            height_range: [-400, 3440],
+            levels: (0..grid.level_count()).map(level).collect(),
+            color: None,
+            sources: Vec::new(),
+        };
+        Self { metadata, delay }
+    }
+
+    fn summary(&self, id: TileId) -> Summary {
+        if !self.metadata.grid.has(id) {
+            return Summary::default();
+        }
+        let error = ERRORS[usize::from(id.level)];
+        Summary {
+            min: -800,
+            max: 4000,
+            error,
+            flags: Summary::PRESENT,
+        }
+    }
+}
+
+impl TileSource for HillSource {
+    fn metadata(&self) -> &Metadata {
+        &self.metadata
+    }
+
+    fn load(&self, id: TileId, _: Option<&Tile>) -> Result<Tile, PyramidError> {
+        std::thread::sleep(self.delay);
+        let children = id.children().map(|child| self.summary(child));
+        Ok(Tile {
+            summary: self.summary(id),
+            children,
+            ..tile(id)
+        })
+    }
 }

@@ -1,8 +1,8 @@
 //! Imagery on the device: one array texture, a layer a tile.
 
-use drumlin_core::terrain::ColorUpload;
+use drumlin_core::terrain::{ColorUpload, PoolSizes};
 
-use crate::vram::{LAYER_BYTES, LAYERS_MAX};
+use crate::vram::LAYER_BYTES;
 
 const SIDE: u32 = 256;
 
@@ -21,7 +21,7 @@ impl ColorPool {
             size: wgpu::Extent3d {
                 width: SIDE,
                 height: SIDE,
-                depth_or_array_layers: layers.clamp(1, LAYERS_MAX),
+                depth_or_array_layers: layers.clamp(1, PoolSizes::MAX_COLOR_LAYERS),
             },
             mip_level_count: 1,
             sample_count: 1,

@@ -8,9 +8,10 @@ use drumlin_core::{
         CLASS_COUNTS_WORD, DRAW_LIST_WORDS, DrawnTile, FLAG_SRGB_OUT, Frame, INDEX_COUNT_WORD,
         SHIFT_COUNTS_WORD,
     },
+    terrain::PoolSizes,
 };
 
-use crate::{readback::Readback, vram::VramPlan};
+use crate::readback::Readback;
 
 /// Bytes of the head of the emitted list: the draw's arguments first, then what was counted.
 const DRAW_LIST_BYTES: u64 = DRAW_LIST_WORDS as u64 * 4;
@@ -53,10 +54,10 @@ pub struct DrawCounts {
 }
 
 impl FrameBuffers {
-    /// Lists as large as the plan says.
-    pub(crate) fn new(device: &wgpu::Device, plan: &VramPlan) -> Self {
+    /// Lists as large as the planner's sizes.
+    pub(crate) fn new(device: &wgpu::Device, sizes: &PoolSizes) -> Self {
         use wgpu::BufferUsages as Usage;
-        let drawn = u64::from(plan.drawn);
+        let drawn = u64::from(sizes.max_drawn);
         let patches = drawn * PATCH_COUNT as u64 * 4;
         let written = Usage::STORAGE | Usage::COPY_SRC;
         Self {
@@ -78,7 +79,7 @@ impl FrameBuffers {
             indices: buffer(
                 device,
                 "drumlin indices",
-                u64::from(plan.indices) * 4,
+                u64::from(sizes.index_capacity) * 4,
                 written | Usage::INDEX,
             ),
             draw_list: buffer(
@@ -87,7 +88,7 @@ impl FrameBuffers {
                 DRAW_LIST_BYTES,
                 written | Usage::INDIRECT | Usage::COPY_DST,
             ),
-            capacity: plan.drawn,
+            capacity: sizes.max_drawn,
             drawn_count: 0,
             counts: Readback::new(device, "drumlin counts", DRAW_LIST_BYTES),
             latest: None,

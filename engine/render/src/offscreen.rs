@@ -82,7 +82,7 @@ impl Offscreen {
         device: &wgpu::Device,
         queue: &wgpu::Queue,
     ) -> Result<Vec<u8>, RenderError> {
-        self.read(device, queue, &self.color)
+        read_texture(device, queue, &self.color)
     }
 
     /// The distances along the view axis, metres, +∞ where nothing is; waits for the device.
@@ -95,7 +95,7 @@ impl Offscreen {
         device: &wgpu::Device,
         queue: &wgpu::Queue,
     ) -> Result<Vec<f32>, RenderError> {
-        let bytes = self.read(device, queue, &self.distance)?;
+        let bytes = read_texture(device, queue, &self.distance)?;
         let (words, _) = bytes.as_chunks::<4>();
         Ok(words.iter().map(|word| f32::from_le_bytes(*word)).collect())
     }
@@ -132,38 +132,38 @@ impl Offscreen {
             multiview_mask: None,
         })
     }
+}
 
-    fn read(
-        &self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        texture: &wgpu::Texture,
-    ) -> Result<Vec<u8>, RenderError> {
-        let row_bytes = self.size[0] * TEXEL_BYTES;
-        let pitch = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let buffer = mappable(device, u64::from(pitch) * u64::from(self.size[1]));
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let layout = wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(pitch),
-            rows_per_image: Some(self.size[1]),
-        };
-        encoder.copy_texture_to_buffer(
-            texture.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer: &buffer,
-                layout,
-            },
-            texture.size(),
-        );
-        queue.submit([encoder.finish()]);
-        let bytes = read_mappable(device, &buffer)?;
-        Ok(bytes
-            .chunks(pitch as usize)
-            .flat_map(|row| &row[..row_bytes as usize])
-            .copied()
-            .collect())
-    }
+/// The texels of a texture of four bytes each, row by row from the top; waits for the device.
+///
+/// # Errors
+///
+/// [`RenderError::Device`] when the device is lost.
+pub fn read_texture(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    texture: &wgpu::Texture,
+) -> Result<Vec<u8>, RenderError> {
+    let row_bytes = texture.width() * TEXEL_BYTES;
+    let pitch = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+    let buffer = mappable(device, u64::from(pitch) * u64::from(texture.height()));
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let layout = wgpu::TexelCopyBufferLayout {
+        offset: 0,
+        bytes_per_row: Some(pitch),
+        rows_per_image: Some(texture.height()),
+    };
+    let destination = wgpu::TexelCopyBufferInfo {
+        buffer: &buffer,
+        layout,
+    };
+    encoder.copy_texture_to_buffer(texture.as_image_copy(), destination, texture.size());
+    queue.submit([encoder.finish()]);
+    let bytes = read_mappable(device, &buffer)?;
+    let rows = bytes
+        .chunks(pitch as usize)
+        .map(|row| &row[..row_bytes as usize]);
+    Ok(rows.collect::<Vec<_>>().concat())
 }
 
 /// The first bytes of a buffer that may be copied from; waits for the device.

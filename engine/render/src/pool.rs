@@ -2,9 +2,12 @@
 //!
 //! A page is made when its first slot is used, which is the only growth; slots are the planner's to give and take.
 
-use drumlin_core::reference::shared::SLOTS_PER_PAGE;
+use drumlin_core::{reference::shared::SLOTS_PER_PAGE, terrain::PoolSizes};
 
-use crate::vram::{PAGE_COUNT, SLOT_BYTES};
+use crate::vram::SLOT_BYTES;
+
+/// Pages a terrain may have; all are bound at once.
+pub(crate) const PAGE_COUNT: u32 = PoolSizes::PAGES;
 
 /// Pages of slots.
 pub(crate) struct Pool {

@@ -4,7 +4,7 @@
 //! puts the result into the caller's render pass. Nothing is made per frame but a pool page that is used for the first
 //! time; nothing is waited for. [`Terrain`](crate::Terrain) owns one; tests hand it plans of their own.
 
-use drumlin_core::terrain::FramePlan;
+use drumlin_core::terrain::{FramePlan, PoolSizes, Upload};
 
 use crate::{
     DrawCounts, GpuTimes, RenderError, check_limits,
@@ -22,7 +22,7 @@ use crate::{
         group,
     },
     staging::Staging,
-    vram::VramPlan,
+    vram::UPLOADS_AT_ONCE,
 };
 
 /// What a renderer is made from.
@@ -30,30 +30,15 @@ use crate::{
 pub struct RendererDescriptor {
     /// What it draws into.
     pub formats: TargetFormats,
-    /// Bytes it may take on the device, everything counted.
-    pub vram_budget_bytes: u64,
+    /// What its buffers hold.
+    pub sizes: PoolSizes,
     /// Metres of a height unit of its tiles.
     pub unit: f32,
-    /// True when its tiles have imagery.
-    pub imagery: bool,
-}
-
-/// What a planner may ask of a renderer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Capacity {
-    /// Slots of the pool.
-    pub slots: u32,
-    /// Layers of imagery.
-    pub layers: u32,
-    /// Tiles of a drawn list.
-    pub drawn: u32,
-    /// Tiles that may go up in one frame.
-    pub uploads: u32,
 }
 
 /// Pool, lists and pipelines of one view of one terrain.
 pub struct Renderer {
-    plan: VramPlan,
+    sizes: PoolSizes,
     unit: f32,
     srgb_out: bool,
     pool: Pool,
@@ -98,10 +83,9 @@ impl Renderer {
         descriptor: &RendererDescriptor,
     ) -> Result<Self, RenderError> {
         check_limits(&device.limits())?;
-        let plan = VramPlan::new(descriptor.vram_budget_bytes, descriptor.imagery)?;
         let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let validity = device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let renderer = Self::build(device, queue, descriptor, plan);
+        let renderer = Self::build(device, queue, descriptor);
         let invalid = pollster::block_on(validity.pop());
         let full = pollster::block_on(memory.pop());
         match (full, invalid) {
@@ -111,20 +95,16 @@ impl Renderer {
         }
     }
 
-    fn build(
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        descriptor: &RendererDescriptor,
-        plan: VramPlan,
-    ) -> Self {
-        let pool = Pool::new(device, plan.slots);
-        let imagery = ColorPool::new(device, plan.layers);
+    fn build(device: &wgpu::Device, queue: &wgpu::Queue, descriptor: &RendererDescriptor) -> Self {
+        let sizes = descriptor.sizes;
+        let pool = Pool::new(device, sizes.slots);
+        let imagery = ColorPool::new(device, sizes.color_layers);
         let staging = Staging::new(device);
-        let view = FrameBuffers::new(device, &plan);
+        let view = FrameBuffers::new(device, &sizes);
         let stages = Stages::new(device, &descriptor.formats);
         let bindings = stages.bind(device, &pool, &imagery, &staging, &view);
         Self {
-            plan,
+            sizes,
             unit: descriptor.unit,
             srgb_out: !descriptor.formats.color.is_srgb(),
             pool,
@@ -139,21 +119,10 @@ impl Renderer {
         }
     }
 
-    /// What a planner may ask of it.
+    /// What its buffers hold.
     #[must_use]
-    pub fn capacity(&self) -> Capacity {
-        let VramPlan {
-            slots,
-            layers,
-            drawn,
-            ..
-        } = self.plan;
-        Capacity {
-            slots,
-            layers,
-            drawn,
-            uploads: crate::vram::UPLOADS_PER_FRAME,
-        }
+    pub fn sizes(&self) -> PoolSizes {
+        self.sizes
     }
 
     /// Puts a plan up and encodes the stages; once a submission, before [`Renderer::draw`].
@@ -169,6 +138,7 @@ impl Renderer {
             timer.begin(encoder);
         }
         self.grow(device, plan);
+        let uploads = self.decode_surplus(device, queue, &plan.uploads);
         for upload in &plan.color_uploads {
             self.imagery.upload(queue, upload);
         }
@@ -176,7 +146,7 @@ impl Renderer {
             self.view.write(queue, &plan.drawn, frame, self.srgb_out);
         }
         encoder.clear_buffer(&self.view.draw_list, 0, None);
-        self.encode_stages(queue, encoder, plan);
+        self.encode_stages(queue, encoder, uploads, plan.frame.is_some());
         self.view.record_counts(encoder, self.frame);
         self.is_drawable = true;
     }
@@ -263,32 +233,60 @@ impl Renderer {
         }
     }
 
+    /// Decodes in submissions of their own what would not fit into the staging buffers; returns the rest.
+    fn decode_surplus<'plan>(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        uploads: &'plan [Upload],
+    ) -> &'plan [Upload] {
+        let mut rest = uploads;
+        while rest.len() > UPLOADS_AT_ONCE as usize {
+            let (first, others) = rest.split_at(UPLOADS_AT_ONCE as usize);
+            let label = Some("drumlin arrivals");
+            let mut encoder =
+                device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            self.decode(queue, &mut pass, first);
+            drop(pass);
+            queue.submit([encoder.finish()]);
+            rest = others;
+        }
+        rest
+    }
+
+    fn decode(
+        &mut self,
+        queue: &wgpu::Queue,
+        pass: &mut wgpu::ComputePass<'_>,
+        uploads: &[Upload],
+    ) {
+        for batch in self.staging.write(queue, &self.pool, uploads, self.unit) {
+            self.stages
+                .decode
+                .dispatch(pass, &self.bindings.pages[batch.page], batch);
+        }
+    }
+
     fn encode_stages(
         &mut self,
         queue: &wgpu::Queue,
         encoder: &mut wgpu::CommandEncoder,
-        plan: &FramePlan,
+        uploads: &[Upload],
+        has_view: bool,
     ) {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("drumlin stages"),
+            timestamp_writes: self.timer.as_ref().map(GpuTimer::stage_writes),
+        });
+        self.decode(queue, &mut pass, uploads);
         let Self {
             stages,
             bindings,
-            staging,
-            pool,
             view,
-            timer,
             ..
         } = self;
-        let batches = staging.write(queue, pool, &plan.uploads, self.unit);
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some("drumlin stages"),
-            timestamp_writes: timer.as_ref().map(GpuTimer::stage_writes),
-        });
-        for batch in batches {
-            stages
-                .decode
-                .dispatch(&mut pass, &bindings.pages[batch.page], batch);
-        }
-        if plan.frame.is_some() && view.drawn_count() > 0 {
+        if has_view && view.drawn_count() > 0 {
             pass.set_bind_group(0, &bindings.frame, &[]);
             pass.set_bind_group(1, &bindings.tiles, &[]);
             stages
@@ -302,7 +300,7 @@ impl Renderer {
                 .dispatch(&mut pass, &bindings.emit, view.drawn_count());
         }
         drop(pass);
-        if let Some(timer) = timer {
+        if let Some(timer) = &mut self.timer {
             timer.end(self.frame);
         }
     }
@@ -312,7 +310,7 @@ impl std::fmt::Debug for Renderer {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         formatter
             .debug_struct("Renderer")
-            .field("plan", &self.plan)
+            .field("sizes", &self.sizes)
             .field("frame", &self.frame)
             .finish_non_exhaustive()
     }

@@ -12,8 +12,8 @@ use drumlin_core::{
 };
 
 use crate::{
-    pool::Pool,
-    vram::{PAGE_COUNT, UPLOADS_PER_FRAME},
+    pool::{PAGE_COUNT, Pool},
+    vram::UPLOADS_AT_ONCE,
 };
 
 /// Multiples at which a binding may begin, by WebGPU's default limits.
@@ -47,8 +47,7 @@ impl Staging {
     /// Room for a frame's tiles, twice: a binding covers as many tiles from wherever it begins.
     pub(crate) fn new(device: &wgpu::Device) -> Self {
         let buffer = |label, tile_bytes: usize| {
-            let room =
-                2 * UPLOADS_PER_FRAME as usize * tile_bytes + PAGE_COUNT as usize * ALIGNMENT;
+            let room = 2 * UPLOADS_AT_ONCE as usize * tile_bytes + PAGE_COUNT as usize * ALIGNMENT;
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
                 size: room as u64,
@@ -65,7 +64,7 @@ impl Staging {
         }
     }
 
-    /// Puts a frame's tiles into the staging buffers; at most [`UPLOADS_PER_FRAME`], whose pages exist.
+    /// Puts a frame's tiles into the staging buffers; at most [`UPLOADS_AT_ONCE`], whose pages exist.
     pub(crate) fn write(
         &mut self,
         queue: &wgpu::Queue,

@@ -8,7 +8,7 @@ use drumlin_core::{
 use super::{Access, layout, module, pipeline, storage};
 use crate::{
     staging::{Batch, Staging},
-    vram::UPLOADS_PER_FRAME,
+    vram::UPLOADS_AT_ONCE,
 };
 
 const GROUP: usize = 64;
@@ -60,7 +60,7 @@ impl Decode {
         let window = |buffer, tile_bytes: usize| wgpu::BufferBinding {
             buffer,
             offset: 0,
-            size: std::num::NonZeroU64::new(u64::from(UPLOADS_PER_FRAME) * tile_bytes as u64),
+            size: std::num::NonZeroU64::new(u64::from(UPLOADS_AT_ONCE) * tile_bytes as u64),
         };
         let headers = window(&staging.headers, size_of::<UploadHeader>());
         let tiles = window(&staging.tiles, UPLOAD_WORDS * 4);

@@ -11,7 +11,7 @@ pub(crate) mod emit;
 
 pub use draw::TargetFormats;
 
-use crate::vram::PAGE_COUNT;
+use crate::pool::PAGE_COUNT;
 
 /// Workgroups of 64 threads for the patches of a tile.
 const PATCH_GROUPS: u32 = 16;
