@@ -7,7 +7,7 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use drumlin::{Headless, Offscreen, wgpu};
+use drumlin::{Headless, Offscreen, Pace, View, wgpu};
 use drumlin_terminal::{outcome::Outcome, print};
 
 use crate::{
@@ -24,7 +24,7 @@ use crate::{
 };
 
 /// Frames after the last one in which its late numbers come back from the device.
-const LATE_FRAMES: usize = 3;
+const LATE_FRAMES: usize = 4;
 
 pub(crate) fn run(arguments: &FlyArguments) -> Result<Outcome> {
     let data = DataSet::open(&arguments.terrain.pyramid)?;
@@ -51,6 +51,14 @@ fn frame_count(path: &Path, fps: f64) -> u32 {
     (path.seconds() * fps + 1e-6) as u32 + 1
 }
 
+fn pace(arguments: &FlyArguments) -> Pace {
+    match arguments.mode {
+        _ if arguments.wait_for_tiles => Pace::Complete,
+        Mode::Stepped => Pace::Stepped,
+        Mode::Paced => Pace::Paced,
+    }
+}
+
 /// A flight under way.
 struct Flight<'a> {
     arguments: &'a FlyArguments,
@@ -64,6 +72,7 @@ struct Flight<'a> {
     /// The terrain's number of each row's frame, rising.
     frame_numbers: Vec<u64>,
     bytes_read: u64,
+    last_view: Option<View>,
 }
 
 impl<'a> Flight<'a> {
@@ -84,7 +93,7 @@ impl<'a> Flight<'a> {
             queue,
             Offscreen::COLOR_FORMAT,
             &arguments.terrain,
-            arguments.wait_for_tiles,
+            pace(arguments),
         )?;
         Ok(Self {
             offscreen: Offscreen::new(device, size),
@@ -95,6 +104,7 @@ impl<'a> Flight<'a> {
             },
             frame_numbers: Vec::new(),
             bytes_read: 0,
+            last_view: None,
             arguments,
             headless,
             scene,
@@ -109,7 +119,8 @@ impl<'a> Flight<'a> {
         for index in 0..self.frame_count {
             let seconds = f64::from(index) / self.arguments.fps;
             self.frame(index, &path.camera(seconds), seconds)?;
-            self.collect_waiting()?;
+            // Every frame's numbers then come back with one of the next updates.
+            self.headless.finish()?;
         }
         Ok(())
     }
@@ -124,7 +135,6 @@ impl<'a> Flight<'a> {
             let seconds = start.elapsed().as_secs_f64().min(path.seconds());
             self.frame(drawn, &path.camera(seconds), seconds)?;
             self.headless.device.poll(wgpu::PollType::Poll)?;
-            self.collect();
             drawn += 1;
             #[expect(
                 clippy::cast_possible_truncation,
@@ -140,9 +150,11 @@ impl<'a> Flight<'a> {
     fn frame(&mut self, index: u32, camera: &Camera, seconds: f64) -> Result<()> {
         let size = self.offscreen.size();
         let view = self.scene.view(camera, size, seconds);
+        self.last_view = Some(view);
         let start = Instant::now();
         self.scene.update(&view, Debug::of(&self.arguments.terrain));
         let updated = start.elapsed();
+        self.collect();
         let commands = self.encode();
         let encoded = start.elapsed();
         self.headless.queue.submit([commands]);
@@ -169,7 +181,8 @@ impl<'a> Flight<'a> {
     }
 
     fn add_row(&mut self, t: f64, [update, encode, total]: [Duration; 3]) {
-        let stats = self.scene.stats();
+        let report = self.scene.report();
+        let stats = &report.stats;
         let millis = |span: Duration| 1000.0 * span.as_secs_f64();
         self.rows.push(FrameRow {
             t,
@@ -182,7 +195,7 @@ impl<'a> Flight<'a> {
             bytes_read: stats.bytes_read - self.bytes_read,
             bytes_uploaded: stats.uploaded_bytes,
             ram_bytes: stats.ram_bytes,
-            vram_bytes: self.scene.vram_bytes(),
+            vram_bytes: report.vram_bytes,
             error_px: stats.tolerance_px,
             ..FrameRow::default()
         });
@@ -204,25 +217,17 @@ impl<'a> Flight<'a> {
         Ok(())
     }
 
-    /// Waits for the device, so that every frame's numbers come back.
-    fn collect_waiting(&mut self) -> Result<()> {
-        self.headless.finish()?;
-        self.collect();
-        Ok(())
-    }
-
     /// Puts numbers that have come back from the device into the rows of their frames.
     fn collect(&mut self) {
-        if let Some(counts) = self.scene.counts()
-            && let Some(row) = self.row(counts.frame)
+        let (counts, times) = (self.scene.report().counts, self.scene.report().gpu_times);
+        if let Some((counts, row)) =
+            counts.and_then(|counts| Some((counts, self.row(counts.frame)?)))
         {
             row.triangles = counts.triangles.into();
             row.patches.regular = counts.regular_patches.map(u64::from);
             row.patches.transition = counts.transition_patches.map(u64::from);
         }
-        if let Some(times) = self.scene.gpu_times()
-            && let Some(row) = self.row(times.frame)
-        {
+        if let Some((times, row)) = times.and_then(|times| Some((times, self.row(times.frame)?))) {
             row.gpu_millis = Some(times.stages_millis + times.pass_millis.unwrap_or(0.0));
         }
     }
@@ -235,10 +240,14 @@ impl<'a> Flight<'a> {
 
     /// Waits for late numbers, and writes what was asked for.
     fn finish(mut self, data: &DataSet) -> Result<Outcome> {
-        for _ in 0..LATE_FRAMES {
-            let commands = self.encode();
-            self.headless.queue.submit([commands]);
-            self.collect_waiting()?;
+        if let Some(view) = self.last_view {
+            for _ in 0..LATE_FRAMES {
+                self.headless.finish()?;
+                self.scene.update(&view, Debug::default());
+                self.collect();
+                let commands = self.encode();
+                self.headless.queue.submit([commands]);
+            }
         }
         if let Some(pictures) = self.pictures.take() {
             pictures.finish()?;

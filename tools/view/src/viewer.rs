@@ -6,7 +6,7 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use drumlin::wgpu;
+use drumlin::{Pace, wgpu};
 use image::RgbaImage;
 use winit::{keyboard::KeyCode, window::Window};
 
@@ -67,7 +67,7 @@ impl Viewer {
             &screen.queue,
             screen.format(),
             &arguments.terrain,
-            false,
+            Pace::Paced,
         )?;
         let now = Instant::now();
         Ok(Self {
@@ -231,8 +231,9 @@ impl Viewer {
             .file_name()
             .unwrap_or_default()
             .to_string_lossy();
-        let triangles = self.scene.counts().map_or(0, |counts| counts.triangles);
-        let stats = self.scene.stats();
+        let report = self.scene.report();
+        let triangles = report.counts.map_or(0, |counts| counts.triangles);
+        let stats = &report.stats;
         let tiles = stats.tiles_drawn;
         let missing = match stats.tiles_missing {
             0 => String::new(),

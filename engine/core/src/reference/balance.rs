@@ -12,7 +12,10 @@
 
 use super::shared::{
     DrawnTile, Frame, SIDE_COARSER, SIDE_FINER, SIDE_SAME,
-    border::{EDGES, PATCH_COUNT, SIDE_NONE, TILE_QUADS, facing, outer_edges, relation_of, sibling, side_words},
+    border::{
+        EDGES, PATCH_COUNT, SIDE_NONE, TILE_QUADS, facing, outer_edges, relation_of, sibling,
+        side_words,
+    },
     patch_word::{FINEST_DEPTH, SHIFT_COUNT},
 };
 
@@ -41,7 +44,11 @@ fn raised_depths(tiles: &[DrawnTile], depths: &[u32], tile: u32, patch: u32) -> 
         }
     }
     (0..SHIFT_COUNT)
-        .map(|shift| own.saturating_sub(shift).max(neighbour.saturating_sub(shift + 1)) << (2 * shift))
+        .map(|shift| {
+            own.saturating_sub(shift)
+                .max(neighbour.saturating_sub(shift + 1))
+                << (2 * shift)
+        })
         .fold(0, |packed, depth| packed | depth)
 }
 
@@ -147,7 +154,13 @@ pub fn edges(frame: &Frame, tiles: &[DrawnTile], raised: &[u32], patches: &mut [
 }
 
 /// Both steps.
-pub fn balance(frame: &Frame, tiles: &[DrawnTile], depths: &[u32], raised: &mut [u32], patches: &mut [u32]) {
+pub fn balance(
+    frame: &Frame,
+    tiles: &[DrawnTile],
+    depths: &[u32],
+    raised: &mut [u32],
+    patches: &mut [u32],
+) {
     raise(frame, tiles, depths, raised);
     edges(frame, tiles, raised, patches);
 }

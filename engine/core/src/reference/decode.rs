@@ -7,17 +7,25 @@
 //! Based on: `FORMAT.md`, the rule of the regular tile; cubic B-splines.
 
 use super::shared::{
-    CODES_WORD, CONTROLS_WORD, HEIGHTS_WORD, SLOPES_WORD, SLOT_WORDS, STRIDE_ERRORS_WORD, UPLOAD_CODES_WORD,
-    UPLOAD_CONTROLS_WORD, UPLOAD_DETAIL_WORD, UPLOAD_VOIDS_WORD, UPLOAD_WORDS, UploadHeader, VOIDS_WORD,
-    pool::pack_2x16_float,
+    CODES_WORD, CONTROLS_WORD, HEIGHTS_WORD, SLOPES_WORD, SLOT_WORDS, STRIDE_ERRORS_WORD,
+    UPLOAD_CODES_WORD, UPLOAD_CONTROLS_WORD, UPLOAD_DETAIL_WORD, UPLOAD_VOIDS_WORD, UPLOAD_WORDS,
+    UploadHeader, VOIDS_WORD, pool::pack_2x16_float,
 };
 use crate::{
-    geo::{CAGE_CONTROL_COUNT, CAGE_CONTROLS, PATCH_COUNT, QUAD_SAMPLES, TILE_CELLS, TILE_QUADS, TILE_SAMPLE_COUNT, TILE_SAMPLES},
+    geo::{
+        CAGE_CONTROL_COUNT, CAGE_CONTROLS, PATCH_COUNT, QUAD_SAMPLES, TILE_CELLS, TILE_QUADS,
+        TILE_SAMPLE_COUNT, TILE_SAMPLES,
+    },
     pyramid::Tile,
 };
 
 /// Cubic B-spline at 0, 1/4, 1/2, 3/4 of a quad; each row sums to 384.
-const LIMIT_WEIGHTS: [[i32; 4]; 4] = [[64, 256, 64, 0], [27, 235, 121, 1], [8, 184, 184, 8], [1, 121, 235, 27]];
+const LIMIT_WEIGHTS: [[i32; 4]; 4] = [
+    [64, 256, 64, 0],
+    [27, 235, 121, 1],
+    [8, 184, 184, 8],
+    [1, 121, 235, 27],
+];
 
 /// A tile as it lies in the staging buffer: `UPLOAD_WORDS` words.
 ///
@@ -27,10 +35,16 @@ const LIMIT_WEIGHTS: [[i32; 4]; 4] = [[64, 256, 64, 0], [27, 235, 121, 1], [8, 1
 pub fn stage_tile(tile: &Tile, words: &mut [u32]) {
     let words = &mut words[..UPLOAD_WORDS];
     words.fill(0);
-    for (word, &control) in words[UPLOAD_CONTROLS_WORD..].iter_mut().zip(&tile.controls[..CAGE_CONTROL_COUNT]) {
+    for (word, &control) in words[UPLOAD_CONTROLS_WORD..]
+        .iter_mut()
+        .zip(&tile.controls[..CAGE_CONTROL_COUNT])
+    {
         *word = control.cast_unsigned();
     }
-    for (word, &code) in words[UPLOAD_DETAIL_WORD..].iter_mut().zip(&tile.detail[..TILE_SAMPLE_COUNT]) {
+    for (word, &code) in words[UPLOAD_DETAIL_WORD..]
+        .iter_mut()
+        .zip(&tile.detail[..TILE_SAMPLE_COUNT])
+    {
         *word = code.cast_unsigned();
     }
     if let Some(voids) = &tile.voids {
@@ -70,13 +84,13 @@ fn code(upload: &[u32], row: usize, column: usize) -> i32 {
 }
 
 /// The limit surface in units, rounded half up: (Σ w K + 73,728) / 147,456, in 32 bits by halves of K.
-fn base_height(upload: &[u32], row: usize, column: usize) -> i32 {
+pub(super) fn base_height(upload: &[u32], row: usize, column: usize) -> i32 {
     let row_weights = LIMIT_WEIGHTS[row % QUAD_SAMPLES];
     let column_weights = LIMIT_WEIGHTS[column % QUAD_SAMPLES];
     let (mut high, mut low) = (0, 0);
-    for (i, row_weight) in row_weights.iter().enumerate() {
-        for (j, column_weight) in column_weights.iter().enumerate() {
-            let weight = row_weight * column_weight;
+    for i in 0..4 {
+        for j in 0..4 {
+            let weight = row_weights[i] * column_weights[j];
             if weight != 0 {
                 let at = (row / QUAD_SAMPLES + i) * CAGE_CONTROLS + column / QUAD_SAMPLES + j;
                 let k = control(upload, at);
@@ -93,14 +107,14 @@ fn base_height(upload: &[u32], row: usize, column: usize) -> i32 {
 /// The residual of an even column: rows between two others continue them.
 fn even_column_residual(upload: &[u32], quantum: i32, row: usize, column: usize) -> i32 {
     let own = quantum * code(upload, row, column);
-    if row.is_multiple_of(2) {
+    if row % 2 == 0 {
         return own;
     }
-    ((quantum * (code(upload, row - 1, column) + code(upload, row + 1, column))) >> 1) + own
+    (quantum * (code(upload, row - 1, column) + code(upload, row + 1, column)) >> 1) + own
 }
 
 fn residual(upload: &[u32], quantum: i32, row: usize, column: usize) -> i32 {
-    if column.is_multiple_of(2) {
+    if column % 2 == 0 {
         return even_column_residual(upload, quantum, row, column);
     }
     let left = even_column_residual(upload, quantum, row, column - 1);
@@ -108,11 +122,18 @@ fn residual(upload: &[u32], quantum: i32, row: usize, column: usize) -> i32 {
     ((left + right) >> 1) + quantum * code(upload, row, column)
 }
 
+/// A sample's residual without its own code, for those who make codes.
+pub(super) fn code_prediction(upload: &[u32], quantum: i32, row: usize, column: usize) -> i32 {
+    residual(upload, quantum, row, column) - quantum * code(upload, row, column)
+}
+
 /// What goes into the slot as it came: voids, patch codes, controls.
 fn copy_rest(slot: &mut [u32], upload: &[u32]) {
-    slot[VOIDS_WORD..STRIDE_ERRORS_WORD].copy_from_slice(&upload[UPLOAD_VOIDS_WORD..UPLOAD_CODES_WORD]);
+    slot[VOIDS_WORD..STRIDE_ERRORS_WORD]
+        .copy_from_slice(&upload[UPLOAD_VOIDS_WORD..UPLOAD_CODES_WORD]);
     slot[CODES_WORD..CONTROLS_WORD].copy_from_slice(&upload[UPLOAD_CODES_WORD..UPLOAD_WORDS]);
-    slot[CONTROLS_WORD..CONTROLS_WORD + CAGE_CONTROL_COUNT].copy_from_slice(&upload[UPLOAD_CONTROLS_WORD..UPLOAD_DETAIL_WORD]);
+    slot[CONTROLS_WORD..CONTROLS_WORD + CAGE_CONTROL_COUNT]
+        .copy_from_slice(&upload[UPLOAD_CONTROLS_WORD..UPLOAD_DETAIL_WORD]);
 }
 
 /// Heights of every sample, and what is copied.
@@ -122,7 +143,8 @@ pub fn heights(page: &mut [u32], headers: &[UploadHeader], staging: &[u32]) {
         let slot = slot_words(page, header);
         for sample in 0..TILE_SAMPLE_COUNT {
             let (row, column) = (sample / TILE_SAMPLES, sample % TILE_SAMPLES);
-            let height = base_height(upload, row, column) + residual(upload, header.quantum, row, column);
+            let height =
+                base_height(upload, row, column) + residual(upload, header.quantum, row, column);
             slot[HEIGHTS_WORD + sample] = height.cast_unsigned();
         }
         copy_rest(slot, upload);
@@ -194,12 +216,20 @@ struct Samples<'a> {
 impl Samples<'_> {
     /// A height at signed coordinates that lie in the tile.
     fn at(&self, place: [i32; 2]) -> i32 {
-        height(self.slot, place[0].unsigned_abs() as usize, place[1].unsigned_abs() as usize)
+        height(
+            self.slot,
+            place[0].unsigned_abs() as usize,
+            place[1].unsigned_abs() as usize,
+        )
     }
 
     /// A sample's distance from a plane through three corners, in units / stride; 0 for a void one.
     fn deviation(&self, place: [i32; 2], stride: i32, plane: i32) -> u32 {
-        if is_void(self.upload, place[0].unsigned_abs() as usize, place[1].unsigned_abs() as usize) {
+        if is_void(
+            self.upload,
+            place[0].unsigned_abs() as usize,
+            place[1].unsigned_abs() as usize,
+        ) {
             return 0;
         }
         (stride * self.at(place) - plane).unsigned_abs()
@@ -208,7 +238,12 @@ impl Samples<'_> {
     /// Both triangles of a plain cell: (NW, SW, SE) and (NW, SE, NE).
     fn plain_deviation(&self, nw: [i32; 2], stride: i32) -> u32 {
         let corner = |i: i32, j: i32| self.at([nw[0] + i, nw[1] + j]);
-        let (a, b, c, d) = (corner(0, 0), corner(stride, 0), corner(stride, stride), corner(0, stride));
+        let (a, b, c, d) = (
+            corner(0, 0),
+            corner(stride, 0),
+            corner(stride, stride),
+            corner(0, stride),
+        );
         let mut worst = 0;
         for i in 0..=stride {
             for j in 0..=stride {
@@ -226,10 +261,17 @@ impl Samples<'_> {
     fn quarter_deviation(&self, centre: [i32; 2], outward: [i32; 2], half: i32) -> u32 {
         let lateral = [-outward[1], outward[0]];
         let place = |u: i32, v: i32| {
-            [centre[0] + u * outward[0] + v * lateral[0], centre[1] + u * outward[1] + v * lateral[1]]
+            [
+                centre[0] + u * outward[0] + v * lateral[0],
+                centre[1] + u * outward[1] + v * lateral[1],
+            ]
         };
         let c = self.at(centre);
-        let (a, b, m) = (self.at(place(half, -half)), self.at(place(half, half)), self.at(place(half, 0)));
+        let (a, b, m) = (
+            self.at(place(half, -half)),
+            self.at(place(half, half)),
+            self.at(place(half, 0)),
+        );
         let mut worst = 0;
         for u in 1..=half {
             for v in -u..=u {
@@ -269,7 +311,11 @@ pub fn strides(page: &mut [u32], headers: &[UploadHeader], staging: &[u32]) {
 }
 
 /// In quarter units at stride 4, in half units at stride 2.
-#[expect(clippy::cast_possible_truncation, clippy::cast_possible_wrap, reason = "samples count to 129")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    reason = "samples count to 129"
+)]
 fn patch_strides(samples: &Samples<'_>, patch: usize) -> [u32; 2] {
     let row = (patch / TILE_QUADS * QUAD_SAMPLES) as i32;
     let column = (patch % TILE_QUADS * QUAD_SAMPLES) as i32;

@@ -41,7 +41,11 @@ pub fn clip_position(frame: &Frame, position: Vec3) -> Vec4 {
 }
 
 /// The depth of the patch under a place, at shift 0.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place lies in 0..=128")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a place lies in 0..=128"
+)]
 fn patch_depth_at(patches: &[u32], here: Place) -> u32 {
     let cell = |at: f32| (at as u32 / QUAD_SAMPLES).min(TILE_QUADS - 1);
     let patch = cell(here.at.y) * TILE_QUADS + cell(here.at.x);
@@ -70,24 +74,39 @@ pub fn shade(
     let sun = Vec3::from(frame.sun);
     let ground = if frame.flags & FLAG_DEPTH_COLORS != 0 {
         let depth = patch_depth_at(patches, here);
-        lit(depth_color(depth, tiles[here.tile as usize].level), normal, sun)
+        lit(
+            depth_color(depth, tiles[here.tile as usize].level),
+            normal,
+            sun,
+        )
     } else {
         let range = (frame.height_range[1] - frame.height_range[0]).max(1.0);
         let share = (position.z + frame.camera_height - frame.height_range[0]) / range;
         lit(natural_color(share, normal), normal, sun)
     };
     let color = Vec3::from(frame.sky).lerp(ground, (-frame.haze * position.length()).exp());
-    if frame.flags & FLAG_SRGB_OUT != 0 { encode_srgb(color) } else { color }
+    if frame.flags & FLAG_SRGB_OUT != 0 {
+        encode_srgb(color)
+    } else {
+        color
+    }
 }
 
 /// Metres along the view axis for every pixel, row by row from the top left; infinite where nothing is.
 ///
 /// Triangles that reach behind the eye are left out: pictures of tests look at ground that lies before it.
 #[must_use]
-pub fn rasterise(frame: &Frame, tiles: &[DrawnTile], pages: &Pages<'_>, indices: &[u32], size: [usize; 2]) -> Vec<f32> {
+pub fn rasterise(
+    frame: &Frame,
+    tiles: &[DrawnTile],
+    pages: &Pages<'_>,
+    indices: &[u32],
+    size: [usize; 2],
+) -> Vec<f32> {
     let mut image = vec![f32::INFINITY; size[0] * size[1]];
     for triangle in indices.chunks_exact(3) {
-        let clip = [0, 1, 2].map(|i| clip_position(frame, vertex_position(frame, tiles, pages, triangle[i])));
+        let clip = [0, 1, 2]
+            .map(|i| clip_position(frame, vertex_position(frame, tiles, pages, triangle[i])));
         if clip.iter().all(|corner| corner.w > 1.0e-6) {
             fill(&mut image, size, clip);
         }
@@ -101,11 +120,18 @@ fn pixel(clip: Vec4, size: [usize; 2]) -> Vec2 {
     Vec2::new(ndc.x + 1.0, 1.0 - ndc.y) * 0.5 * Vec2::new(size[0] as f32, size[1] as f32)
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the picture before")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to the picture before"
+)]
 fn fill(image: &mut [f32], size: [usize; 2], clip: [Vec4; 3]) {
     let corner = clip.map(|clip| pixel(clip, size));
     let low = corner[0].min(corner[1]).min(corner[2]).max(Vec2::ZERO);
-    let high = corner[0].max(corner[1]).max(corner[2]).min(Vec2::new(size[0] as f32, size[1] as f32));
+    let high = corner[0]
+        .max(corner[1])
+        .max(corner[2])
+        .min(Vec2::new(size[0] as f32, size[1] as f32));
     let area = (corner[1] - corner[0]).perp_dot(corner[2] - corner[0]);
     if area == 0.0 || low.x >= high.x || low.y >= high.y {
         return;
@@ -113,7 +139,8 @@ fn fill(image: &mut [f32], size: [usize; 2], clip: [Vec4; 3]) {
     for y in low.y as usize..high.y.ceil() as usize {
         for x in low.x as usize..high.x.ceil() as usize {
             let centre = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-            let share = |i: usize, j: usize| (corner[i] - centre).perp_dot(corner[j] - centre) / area;
+            let share =
+                |i: usize, j: usize| (corner[i] - centre).perp_dot(corner[j] - centre) / area;
             let weights = [share(1, 2), share(2, 0), share(0, 1)];
             if weights.iter().all(|&weight| weight >= 0.0) {
                 // 1 / w is linear on the screen.

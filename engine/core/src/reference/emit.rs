@@ -18,11 +18,12 @@
 //! subdivision surfaces*, 2012.
 
 use super::shared::{
-    CLASS_COUNTS_WORD, CURSOR_WORD, DrawnTile, FLAG_DRAW_VOIDS, Frame, INDEX_COUNT_WORD, INSTANCE_COUNT_WORD,
-    SAMPLE_BITS, SHIFT_COUNTS_WORD, SIDE_SAME, SKIRT_FIRST, TILE_VISIBLE, TILE_VOIDS,
+    CLASS_COUNTS_WORD, CURSOR_WORD, DrawnTile, FLAG_DRAW_VOIDS, Frame, INDEX_COUNT_WORD,
+    INSTANCE_COUNT_WORD, SAMPLE_BITS, SHIFT_COUNTS_WORD, SIDE_SAME, SKIRT_FIRST, TILE_VISIBLE,
+    TILE_VOIDS,
     border::{
-        EDGE_EAST, EDGE_NORTH, EDGE_SOUTH, EDGE_WEST, EDGES, PATCH_COUNT, QUAD_SAMPLES, TILE_CELLS, TILE_QUADS,
-        TILE_SAMPLES, facing, outer_edges, owned_vertex, skirt_sample,
+        EDGE_EAST, EDGE_NORTH, EDGE_SOUTH, EDGE_WEST, EDGES, PATCH_COUNT, QUAD_SAMPLES, TILE_CELLS,
+        TILE_QUADS, TILE_SAMPLES, facing, outer_edges, owned_vertex, skirt_sample,
     },
     patch_word::{FINEST_DEPTH, SHIFT_COUNT, word_coarser, word_depth, word_split},
     pool::{Pages, pool_void},
@@ -60,7 +61,11 @@ fn surface_triangles(word: u32, shift: u32) -> u32 {
     let mut triangles = 0;
     for cell in 0..count * count {
         let split = outer_edges(cell / count, cell % count, count) & word_split(word, shift);
-        triangles += if split == 0 { 2 } else { 4 + split.count_ones() };
+        triangles += if split == 0 {
+            2
+        } else {
+            4 + split.count_ones()
+        };
     }
     triangles
 }
@@ -86,7 +91,8 @@ pub fn count(frame: &Frame, tiles: &[DrawnTile], patches: &[u32], draw_list: &mu
         for patch in 0..PATCH_COUNT {
             let word = patches[(tile * PATCH_COUNT + patch) as usize];
             for shift in 0..SHIFT_COUNT {
-                draw_list[SHIFT_COUNTS_WORD + shift as usize] += patch_index_count(tiles, tile, patch, word, shift);
+                draw_list[SHIFT_COUNTS_WORD + shift as usize] +=
+                    patch_index_count(tiles, tile, patch, word, shift);
             }
         }
     }
@@ -164,7 +170,10 @@ impl Writer<'_> {
     }
 
     fn surface(&mut self, patch: u32, word: u32, shift: u32) {
-        let nw = [patch / TILE_QUADS * QUAD_SAMPLES, patch % TILE_QUADS * QUAD_SAMPLES];
+        let nw = [
+            patch / TILE_QUADS * QUAD_SAMPLES,
+            patch % TILE_QUADS * QUAD_SAMPLES,
+        ];
         let depth = word_depth(word, shift);
         if depth == FINEST_DEPTH && word_coarser(word) != 0 {
             for block in 0..4 {
@@ -178,7 +187,11 @@ impl Writer<'_> {
         for i in 0..count * count {
             let place = [i / count, i % count];
             let split = outer_edges(place[0], place[1], count) & word_split(word, shift);
-            self.cell([nw[0] + place[0] * stride, nw[1] + place[1] * stride], stride, split);
+            self.cell(
+                [nw[0] + place[0] * stride, nw[1] + place[1] * stride],
+                stride,
+                split,
+            );
         }
     }
 
@@ -244,7 +257,14 @@ pub fn write(
         draw_list[INSTANCE_COUNT_WORD] = 1;
         return;
     }
-    let mut writer = Writer { frame, tiles, pages, indices, at: 0, tile: 0 };
+    let mut writer = Writer {
+        frame,
+        tiles,
+        pages,
+        indices,
+        at: 0,
+        tile: 0,
+    };
     for tile in (0..frame.drawn_count).filter(|&tile| is_drawn(&tiles[tile as usize])) {
         writer.tile = tile;
         for patch in 0..PATCH_COUNT {
@@ -253,7 +273,10 @@ pub fn write(
             draw_list[CURSOR_WORD] += count;
             draw_list[INDEX_COUNT_WORD] += count;
             writer.patch(patch, word, shift);
-            debug_assert_eq!(writer.at, draw_list[CURSOR_WORD] as usize, "counted as written");
+            debug_assert_eq!(
+                writer.at, draw_list[CURSOR_WORD] as usize,
+                "counted as written"
+            );
             let is_transition = word_split(word, shift) != 0;
             let class = word_depth(word, shift) as usize + if is_transition { 3 } else { 0 };
             draw_list[CLASS_COUNTS_WORD + class] += 1;

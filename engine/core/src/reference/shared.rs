@@ -9,6 +9,7 @@ pub mod colors;
 pub mod ground;
 pub mod patch_word;
 pub mod pool;
+pub mod synthetic;
 
 /// No tile, no slot, no fixed depth.
 pub const NONE: u32 = u32::MAX;

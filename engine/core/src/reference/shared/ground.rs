@@ -48,13 +48,20 @@ fn beyond(at: Vec2) -> u32 {
 /// A triangle knows a tile by its first vertex alone, and on a border that may be a neighbour's.
 #[must_use]
 pub fn locate(tiles: &[DrawnTile], tile: u32, position: Vec2) -> Place {
-    let mut here = Place { tile, at: place_in(&tiles[tile as usize], position) };
+    let mut here = Place {
+        tile,
+        at: place_in(&tiles[tile as usize], position),
+    };
     for _ in 0..2 {
         let edge = beyond(here.at);
         if edge == 0 {
             break;
         }
-        let along = if is_horizontal(edge) { here.at.x } else { here.at.y };
+        let along = if is_horizontal(edge) {
+            here.at.x
+        } else {
+            here.at.y
+        };
         let half = usize::from(along > (TILE_CELLS / 2) as f32);
         let word = side_words(&tiles[here.tile as usize], edge)[half];
         if word == NONE {
@@ -71,7 +78,10 @@ pub fn locate(tiles: &[DrawnTile], tile: u32, position: Vec2) -> Place {
 #[expect(clippy::cast_possible_truncation, reason = "a place lies in 0..=128")]
 #[expect(clippy::cast_sign_loss, reason = "a place lies in 0..=128")]
 fn slope_between(pages: &Pages<'_>, slot: u32, at: Vec2) -> Vec2 {
-    let cell = [(at.x as u32).min(TILE_CELLS - 1), (at.y as u32).min(TILE_CELLS - 1)];
+    let cell = [
+        (at.x as u32).min(TILE_CELLS - 1),
+        (at.y as u32).min(TILE_CELLS - 1),
+    ];
     let f = at - Vec2::new(cell[0] as f32, cell[1] as f32);
     let sample = cell[1] * TILE_SAMPLES + cell[0];
     let slope = |offset: u32| Vec2::from(pool_slope(pages, slot, sample + offset));
@@ -101,7 +111,8 @@ fn parent_weight(tiles: &[DrawnTile], tile: &DrawnTile, at: Vec2) -> f32 {
     if inside.x < nearest && is_coarser_side(tile, if is_far[0] { EDGE_EAST } else { EDGE_WEST }) {
         nearest = inside.x;
     }
-    if inside.y < nearest && is_coarser_side(tile, if is_far[1] { EDGE_SOUTH } else { EDGE_NORTH }) {
+    if inside.y < nearest && is_coarser_side(tile, if is_far[1] { EDGE_SOUTH } else { EDGE_NORTH })
+    {
         nearest = inside.y;
     }
     let corner = usize::from(is_far[0]) + 2 * usize::from(is_far[1]);

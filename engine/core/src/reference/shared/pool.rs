@@ -2,7 +2,10 @@
 //!
 //! Twin: `shaders/shared/pool.wgsl`.
 
-use super::{CODES_WORD, HEIGHTS_WORD, SLOPES_WORD, SLOT_WORDS, SLOTS_PER_PAGE, STRIDE_ERRORS_WORD, VOIDS_WORD};
+use super::{
+    CODES_WORD, HEIGHTS_WORD, SLOPES_WORD, SLOT_WORDS, SLOTS_PER_PAGE, STRIDE_ERRORS_WORD,
+    VOIDS_WORD,
+};
 
 /// The pages, in binding order; unused ones are empty.
 pub type Pages<'a> = [&'a [u32]; 4];
@@ -35,7 +38,11 @@ pub fn pool_void(pages: &Pages<'_>, slot: u32, sample: u32) -> bool {
 /// Metres that stride 4 (depth 0) or stride 2 (depth 1) is off stride 1.
 #[must_use]
 pub fn pool_stride_error(pages: &Pages<'_>, slot: u32, patch: u32, depth: u32) -> f32 {
-    f32::from_bits(pool(pages, slot, STRIDE_ERRORS_WORD + (patch * 2 + depth) as usize))
+    f32::from_bits(pool(
+        pages,
+        slot,
+        STRIDE_ERRORS_WORD + (patch * 2 + depth) as usize,
+    ))
 }
 
 /// The error code of depth 0 or 1.
@@ -57,7 +64,10 @@ pub fn unpack_2x16_float(word: u32) -> [f32; 2] {
 }
 
 /// Half precision: 1 bit sign, 5 bits exponent biased by 15, 10 bits fraction.
-#[expect(clippy::cast_possible_truncation, reason = "masked to 16 bits; adding integers below 2^11 is exact")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "masked to 16 bits; adding integers below 2^11 is exact"
+)]
 fn half_from_float(value: f32) -> u16 {
     let sign = (value.to_bits() >> 16 & 0x8000) as u16;
     let size = value.abs();
@@ -104,9 +114,20 @@ mod tests {
 
     #[test]
     fn halves_round_to_the_nearest() {
-        for value in [0.1_f32, -0.37, 1.0e-6, 3.0e-5, 2.718_281_7, 1234.5, 65_519.0] {
+        for value in [
+            0.1_f32,
+            -0.37,
+            1.0e-6,
+            3.0e-5,
+            2.718_281_7,
+            1234.5,
+            65_519.0,
+        ] {
             let back = float_from_half(u32::from(half_from_float(value)));
-            assert!((back - value).abs() <= value.abs() / 2048.0 + 3.0e-8, "{value} became {back}");
+            assert!(
+                (back - value).abs() <= value.abs() / 2048.0 + 3.0e-8,
+                "{value} became {back}"
+            );
         }
     }
 }
