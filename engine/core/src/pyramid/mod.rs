@@ -2,17 +2,20 @@
 //!
 //! `FORMAT.md` beside this crate draws every byte. Knows files and numbers; knows no camera and no screen.
 
+pub mod build;
 mod error;
 mod files;
 mod metadata;
 mod query;
 mod reader;
+mod patch_code;
 mod record;
 #[cfg(test)]
-pub(crate) mod sample;
+mod sample;
 mod shard;
 mod store;
 pub mod surface;
+pub mod templates;
 mod tile;
 mod validate;
 mod writer;
@@ -24,6 +27,7 @@ pub use error::PyramidError;
 pub use metadata::{ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};
 pub use query::Heights;
 pub use reader::Pyramid;
+pub use patch_code::{HALF_OCTAVES, NEVER, patch_error, patch_nibble};
 pub use record::{Record, RecordLayout, RecordParts, VOID_BYTES, number_bytes};
 pub use shard::{SHARD_TILES, shard_count, shard_shape};
 pub use store::{FaultStore, Faults, FileStore, MappedStore, Store, StoreError};

@@ -88,9 +88,9 @@ pub(super) fn base_height(upload: &[u32], row: usize, column: usize) -> i32 {
     let row_weights = LIMIT_WEIGHTS[row % QUAD_SAMPLES];
     let column_weights = LIMIT_WEIGHTS[column % QUAD_SAMPLES];
     let (mut high, mut low) = (0, 0);
-    for (i, row_weight) in row_weights.iter().enumerate() {
-        for (j, column_weight) in column_weights.iter().enumerate() {
-            let weight = row_weight * column_weight;
+    for i in 0..4 {
+        for j in 0..4 {
+            let weight = row_weights[i] * column_weights[j];
             if weight != 0 {
                 let at = (row / QUAD_SAMPLES + i) * CAGE_CONTROLS + column / QUAD_SAMPLES + j;
                 let k = control(upload, at);
@@ -107,14 +107,14 @@ pub(super) fn base_height(upload: &[u32], row: usize, column: usize) -> i32 {
 /// The residual of an even column: rows between two others continue them.
 fn even_column_residual(upload: &[u32], quantum: i32, row: usize, column: usize) -> i32 {
     let own = quantum * code(upload, row, column);
-    if row.is_multiple_of(2) {
+    if row % 2 == 0 {
         return own;
     }
-    ((quantum * (code(upload, row - 1, column) + code(upload, row + 1, column))) >> 1) + own
+    (quantum * (code(upload, row - 1, column) + code(upload, row + 1, column)) >> 1) + own
 }
 
 fn residual(upload: &[u32], quantum: i32, row: usize, column: usize) -> i32 {
-    if column.is_multiple_of(2) {
+    if column % 2 == 0 {
         return even_column_residual(upload, quantum, row, column);
     }
     let left = even_column_residual(upload, quantum, row, column - 1);

@@ -6,8 +6,6 @@
 //! Based on: the feature processing unit of Lin, Wang, Sun, *Improved feature-adaptive subdivision for Catmull-Clark
 //! surface model*, 2018, with an error in pixels in place of its area ratio.
 
-use std::f32::consts::SQRT_2;
-
 use glam::{Vec2, Vec3};
 
 use super::shared::{
@@ -20,19 +18,19 @@ use super::shared::{
 /// 2^(n / 2): what nibble n of a patch code multiplies.
 const CODE_FACTORS: [f32; 15] = [
     1.0,
-    SQRT_2,
+    1.414_213_56,
     2.0,
-    2.0 * SQRT_2,
+    2.828_427_12,
     4.0,
-    4.0 * SQRT_2,
+    5.656_854_25,
     8.0,
-    8.0 * SQRT_2,
+    11.313_708_5,
     16.0,
-    16.0 * SQRT_2,
+    22.627_417,
     32.0,
-    32.0 * SQRT_2,
+    45.254_834,
     64.0,
-    64.0 * SQRT_2,
+    90.509_668,
     128.0,
 ];
 const CODE_NEVER: u32 = 15;
