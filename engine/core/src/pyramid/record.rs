@@ -80,6 +80,20 @@ impl RecordLayout {
             + TILE_SAMPLE_COUNT * self.detail_bytes as usize
     }
 
+    /// Lengths of what follows each other in a record and is of one kind: for whoever compresses it.
+    pub(super) fn sections(&self) -> Vec<usize> {
+        let head = [
+            ID_BYTES + 5 * SUMMARY_BYTES + PATCH_COUNT,
+            if self.voids { VOID_BYTES } else { 0 },
+        ];
+        let planes = |count: usize, width: u8| std::iter::repeat_n(count, usize::from(width));
+        let cage = planes(CAGE_CONTROL_COUNT, self.cage_bytes);
+        head.into_iter()
+            .chain(cage)
+            .chain(planes(TILE_SAMPLE_COUNT, self.detail_bytes))
+            .collect()
+    }
+
     /// The bytes of a record.
     ///
     /// # Panics
@@ -158,11 +172,13 @@ impl RecordLayout {
 }
 
 /// The narrowest width in bytes that holds a number: 1, 2 or 4. A level takes the widest of its numbers'.
+///
+/// The digits of a number are balanced, −128 to 127, so two of them reach from −0x8080 to 0x7f7f.
 #[must_use]
 pub const fn number_bytes(number: i32) -> u8 {
     match number {
         -0x80..=0x7f => 1,
-        -0x8000..=0x7fff => 2,
+        -0x8080..=0x7f7f => 2,
         _ => 4,
     }
 }
@@ -215,43 +231,42 @@ fn take<const N: usize>(rest: &mut &[u8]) -> [u8; N] {
     out
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "asserted to fit")]
+/// Writes numbers digit by digit: all lowest digits, then all second ones, and so on.
+///
+/// Digits to the base 256 are balanced: a small number, negative or not, has zeros for all but its lowest, so that a few
+/// large numbers in a level cost the others next to nothing.
 fn put_numbers(bytes: &mut Vec<u8>, numbers: &[i32], width: u8) {
     let worst = numbers.iter().map(|&number| number_bytes(number)).max();
     assert!(
         worst <= Some(width),
         "numbers of {worst:?} bytes at a level of {width}"
     );
-    match width {
-        1 => bytes.extend(numbers.iter().map(|&number| (number as i8).cast_unsigned())),
-        2 => numbers
-            .iter()
-            .for_each(|&number| bytes.extend((number as i16).to_le_bytes())),
-        _ => numbers
-            .iter()
-            .for_each(|number| bytes.extend(number.to_le_bytes())),
+    for place in 0..width {
+        bytes.extend(numbers.iter().map(|&number| digit(number, place)));
     }
 }
 
+/// The balanced digit of a number at a place, as a byte: adding half a base at every place below makes carries of
+/// what is over 127.
+const fn digit(number: i32, place: u8) -> u8 {
+    const HALVES: [i32; 4] = [0, 0x80, 0x8080, 0x80_8080];
+    (number.wrapping_add(HALVES[place as usize]) >> (8 * place)).to_le_bytes()[0]
+}
+
+/// Reads what [`put_numbers`] wrote.
 fn numbers(bytes: &[u8], width: u8) -> Box<[i32]> {
-    match width {
-        1 => bytes
-            .iter()
-            .map(|byte| i32::from(byte.cast_signed()))
-            .collect(),
-        2 => bytes
-            .as_chunks()
-            .0
-            .iter()
-            .map(|&pair| i32::from(i16::from_le_bytes(pair)))
-            .collect(),
-        _ => bytes
-            .as_chunks()
-            .0
-            .iter()
-            .map(|&four| i32::from_le_bytes(four))
-            .collect(),
+    let count = bytes.len() / usize::from(width);
+    let (lowest, rest) = bytes.split_at(count);
+    let mut numbers: Box<[i32]> = lowest
+        .iter()
+        .map(|byte| i32::from(byte.cast_signed()))
+        .collect();
+    for (place, plane) in (1..).zip(rest.chunks_exact(count)) {
+        for (number, byte) in numbers.iter_mut().zip(plane) {
+            *number = number.wrapping_add(i32::from(byte.cast_signed()) << (8 * place));
+        }
     }
+    numbers
 }
 
 #[cfg(test)]
@@ -373,7 +388,59 @@ mod tests {
 
     #[test]
     fn widths_are_the_narrowest_that_fit() {
-        let widths = [-128, 127, 128, -129, 32_767, -32_768, 32_768, i32::MIN].map(number_bytes);
-        assert_eq!(widths, [1, 1, 2, 2, 2, 2, 4, 4]);
+        let widths = [
+            -128,
+            127,
+            128,
+            -129,
+            32_639,
+            -32_896,
+            32_640,
+            -32_897,
+            i32::MIN,
+        ]
+        .map(number_bytes);
+        assert_eq!(widths, [1, 1, 2, 2, 2, 2, 4, 4, 4]);
+    }
+
+    #[test]
+    fn every_number_survives_its_digits() {
+        let edges = [
+            0,
+            1,
+            -1,
+            127,
+            128,
+            -128,
+            -129,
+            255,
+            256,
+            32_639,
+            -32_896,
+            32_640,
+            1 << 24,
+            i32::MAX,
+            i32::MIN,
+        ];
+        for width in [1, 2, 4] {
+            let fit: Vec<i32> = edges
+                .into_iter()
+                .filter(|&edge| number_bytes(edge) <= width)
+                .collect();
+            let mut bytes = Vec::new();
+            put_numbers(&mut bytes, &fit, width);
+            assert_eq!(
+                (bytes.len(), &*numbers(&bytes, width)),
+                (fit.len() * usize::from(width), &*fit)
+            );
+        }
+    }
+
+    #[test]
+    fn small_numbers_have_one_digit_at_every_width() {
+        let small: Vec<i32> = (-128..128).collect();
+        let mut bytes = Vec::new();
+        put_numbers(&mut bytes, &small, 4);
+        assert!(bytes[256..].iter().all(|&byte| byte == 0));
     }
 }

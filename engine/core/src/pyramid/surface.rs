@@ -101,18 +101,22 @@ pub fn encode_controls(wanted: &[i32], parent: &[i32], quadrant: u32, step: i32)
 #[must_use]
 pub fn base_heights(controls: &[i32]) -> Vec<i32> {
     assert_eq!(controls.len(), CAGE_CONTROL_COUNT, "a cage");
+    // A row of zeros past the end, for the last samples' fourth control, which has no weight.
+    let mut lattice = [0.0; (CAGE_CONTROLS + 1) * CAGE_CONTROLS];
+    for (place, &control) in lattice.iter_mut().zip(controls) {
+        *place = f64::from(control);
+    }
     let mut heights = vec![0; TILE_SAMPLE_COUNT];
     let mut across = [0.0; CAGE_CONTROLS + 1];
     for (row, out) in heights.chunks_exact_mut(TILE_SAMPLES).enumerate() {
-        let (first, weights) = taps(row);
+        let weights = LIMIT_WEIGHTS[row % QUAD_SAMPLES].map(f64::from);
+        let rows = &lattice[row / QUAD_SAMPLES * CAGE_CONTROLS..][..4 * CAGE_CONTROLS];
+        let (rows, _) = rows.as_chunks::<CAGE_CONTROLS>();
         for (column, sum) in across[..CAGE_CONTROLS].iter_mut().enumerate() {
-            *sum = (0..4).fold(0.0, |sum, tap| {
-                let control = controls
-                    .get((first + tap) * CAGE_CONTROLS + column)
-                    .copied()
-                    .unwrap_or(0);
-                sum + weights[tap] * f64::from(control)
-            });
+            *sum = weights[0] * rows[0][column]
+                + weights[1] * rows[1][column]
+                + weights[2] * rows[2][column]
+                + weights[3] * rows[3][column];
         }
         base_row(&across, out);
     }
@@ -214,13 +218,13 @@ pub fn base_height_32(controls: &[i32], row: usize, column: usize) -> i32 {
     let column_weights = LIMIT_WEIGHTS[column % QUAD_SAMPLES];
     let mut high = 0;
     let mut low = 0;
-    for a in 0..4 {
-        for b in 0..4 {
+    for (a, row_weight) in row_weights.into_iter().enumerate() {
+        for (b, column_weight) in column_weights.into_iter().enumerate() {
             // The last row and column have weight 0 for the control that would lie outside.
             let i = (row / QUAD_SAMPLES + a).min(CAGE_CONTROLS - 1);
             let j = (column / QUAD_SAMPLES + b).min(CAGE_CONTROLS - 1);
             let control = controls[i * CAGE_CONTROLS + j];
-            let weight = row_weights[a] * column_weights[b];
+            let weight = row_weight * column_weight;
             high += weight * (control >> 12);
             low += weight * (control & 4095);
         }
@@ -255,32 +259,33 @@ const fn nearest_code(difference: i32, step: i32) -> i32 {
     }
 }
 
-/// First control and weights of a row or column of samples.
-fn taps(sample: usize) -> (usize, [f64; 4]) {
-    (
-        sample / QUAD_SAMPLES,
-        LIMIT_WEIGHTS[sample % QUAD_SAMPLES].map(f64::from),
-    )
+/// One row of the limit surface from its sums over rows of controls (one zero past the end).
+fn base_row(across: &[f64; CAGE_CONTROLS + 1], out: &mut [i32]) {
+    let weights = LIMIT_WEIGHTS.map(|weights| weights.map(f64::from));
+    let sum = |w: &[f64; 4], c: &[f64]| w[0] * c[0] + w[1] * c[1] + w[2] * c[2] + w[3] * c[3];
+    let (quads, last) = out.as_chunks_mut::<QUAD_SAMPLES>();
+    for (heights, controls) in quads.iter_mut().zip(across.windows(4)) {
+        for (height, weights) in heights.iter_mut().zip(&weights) {
+            *height = round_sum(sum(weights, controls));
+        }
+    }
+    for height in last {
+        *height = round_sum(sum(&weights[0], &across[TILE_QUADS..]));
+    }
 }
 
-/// One row of the limit surface from its sums over rows of controls (one zero past the end).
+/// `sum / 147,456` rounded half up, for a whole number `sum`.
 ///
-/// Doubles hold these integers exactly, and vectorise: |sum| < 147,456 · 2²⁵ < 2⁴³. Adding ½ keeps the numerator half
-/// a step from every multiple of the divisor, far more than the product's rounding, so that truncation is the floor.
-fn base_row(across: &[f64; CAGE_CONTROLS + 1], out: &mut [i32]) {
-    const BIAS: i32 = 1 << 27;
-    let shift = f64::from(BIAS) * f64::from(WEIGHT_SUM) + f64::from(WEIGHT_SUM / 2) + 0.5;
-    let scale = 1.0 / f64::from(WEIGHT_SUM);
-    for (column, height) in out.iter_mut().enumerate() {
-        let (first, weights) = taps(column);
-        let sum = (0..4).fold(shift, |sum, tap| sum + weights[tap] * across[first + tap]);
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "the floor is meant; absurd controls saturate"
-        )]
-        let biased = (sum * scale) as i32;
-        *height = biased.wrapping_sub(BIAS);
-    }
+/// Doubles hold these integers exactly, and vectorise: |sum| < 147,456 · 2²⁵ < 2⁴³. Adding ½ to the numerator makes a
+/// half a little more than a half, and keeps every quotient 2⁻¹⁹ away from one, far more than the product's rounding.
+/// Adding 1.5 · 2⁵² then rounds to the nearest whole number and leaves it in the low bits. Absurd sums wrap.
+#[inline]
+fn round_sum(sum: f64) -> i32 {
+    const MAGIC: f64 = 1.5 * (1_u64 << 52) as f64;
+    let rounded = (sum + 0.5) * (1.0 / 147_456.0) + MAGIC;
+    #[expect(clippy::cast_possible_truncation, reason = "the low bits are meant")]
+    let low = rounded.to_bits() as u32;
+    low.cast_signed()
 }
 
 /// A window of a lattice's subdivision, whose first row and column are even.

@@ -1,1 +1,3 @@
-//! See the module's plan in ARCHITECTURE.md.
+//! The GPU stages on the CPU: one file a stage, the same names and order of steps as its WGSL twin.
+
+pub mod shared;

@@ -1,6 +1,6 @@
 //! What is refused, what survives a kill, what is equal for any number of threads.
 
-use super::*;
+use super::{place::is_pyramid, *};
 use crate::pyramid::sample;
 
 fn bytes_of(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {

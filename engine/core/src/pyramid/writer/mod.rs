@@ -10,21 +10,27 @@
 //! Until then nothing is called OUT (or the old pyramid still is), so a build that is killed leaves nothing that looks
 //! finished; a second run takes over what is there. Knows files and bytes; knows no heights.
 
+mod block;
+mod place;
+
 use std::{
     collections::HashMap,
-    fs::{self, File, TryLockError},
-    io::{BufRead, BufReader, ErrorKind, Seek, SeekFrom, Write},
+    fs::{self, File},
+    io::{BufRead, BufReader, ErrorKind, Write},
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
 };
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use self::{
+    block::{Block, Contents},
+    place::{check_target, claim, remove_if_there, settle_replacement, start_over},
+};
 use super::{
     COLOR_TEXELS, Metadata, PyramidError, RecordLayout,
     files::{sibling, sync_folder, write_whole, write_whole_with},
-    shard::{SHARD_TILES, ShardIndex, ZSTD_LEVEL, encode_chunk, shard_count, shard_shape, z_order},
+    shard::shard_count,
     zarr,
 };
 use crate::geo::TileId;
@@ -35,10 +41,6 @@ const MARKER: &str = "unfinished";
 const JOURNAL: &str = "manifest/journal.jsonl";
 /// One line a shard, when done.
 pub(super) const MANIFEST: &str = "manifest/shards.jsonl";
-/// How hard zstd tries on imagery, which gives little for more.
-const COLOR_ZSTD_LEVEL: i32 = 6;
-/// Chunks in memory at once, for each of which a record is made.
-const BATCH: usize = 64;
 
 /// A shard that is on the disk: a line of the manifest.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -142,7 +144,7 @@ impl PyramidWriter {
             tiles,
             shard,
             chunk_bytes: layout.byte_count(),
-            zstd_level: ZSTD_LEVEL,
+            sections: layout.sections(),
         };
         self.write_block(key, &block, records)
     }
@@ -166,7 +168,7 @@ impl PyramidWriter {
             tiles,
             shard,
             chunk_bytes,
-            zstd_level: COLOR_ZSTD_LEVEL,
+            sections: Vec::new(),
         };
         self.write_block(key, &block, texels)
     }
@@ -206,7 +208,7 @@ impl PyramidWriter {
         &self,
         key: String,
         block: &Block,
-        contents: &(dyn Fn(TileId) -> Option<Vec<u8>> + Sync),
+        contents: Contents<'_>,
     ) -> Result<ShardInfo, PyramidError> {
         let path = self.folder.join(&key);
         if let Some(kept) = self.kept.get(&key)
@@ -295,151 +297,6 @@ impl PyramidWriter {
     }
 }
 
-/// What one shard holds.
-struct Block {
-    level: u8,
-    tiles: [u32; 2],
-    shard: [u32; 2],
-    chunk_bytes: usize,
-    zstd_level: i32,
-}
-
-impl Block {
-    /// Writes chunks after the place of the index, then the index; returns how many chunks there are.
-    fn write(
-        &self,
-        file: &mut File,
-        contents: &(dyn Fn(TileId) -> Option<Vec<u8>> + Sync),
-    ) -> std::io::Result<u32> {
-        let shape = shard_shape(self.tiles);
-        let mut index = ShardIndex::new(shape);
-        let mut offset = ShardIndex::byte_count(shape) as u64;
-        file.seek(SeekFrom::Start(offset))?;
-        for slots in z_order(shape).chunks(BATCH) {
-            let chunks: Vec<_> = slots
-                .par_iter()
-                .map(|&slot| self.chunk(slot, contents))
-                .collect();
-            for (&slot, chunk) in slots.iter().zip(chunks) {
-                let Some(chunk) = chunk? else { continue };
-                file.write_all(&chunk)?;
-                index.set(slot, offset..offset + chunk.len() as u64);
-                offset += chunk.len() as u64;
-            }
-        }
-        file.rewind()?;
-        file.write_all(&index.encode())?;
-        Ok(u32::try_from(index.chunk_count()).unwrap_or(u32::MAX))
-    }
-
-    fn chunk(
-        &self,
-        slot: [u32; 2],
-        contents: &(dyn Fn(TileId) -> Option<Vec<u8>> + Sync),
-    ) -> std::io::Result<Option<Vec<u8>>> {
-        let [row, column] = [0, 1].map(|axis| self.shard[axis] * SHARD_TILES + slot[axis]);
-        if row >= self.tiles[0] || column >= self.tiles[1] {
-            return Ok(None);
-        }
-        let Some(bytes) = contents(TileId::new(self.level, row, column)) else {
-            return Ok(None);
-        };
-        assert_eq!(
-            bytes.len(),
-            self.chunk_bytes,
-            "bytes of a chunk of level {}",
-            self.level
-        );
-        encode_chunk(&bytes, self.zstd_level).map(Some)
-    }
-}
-
-/// True for a folder with a pyramid's root in it, of whatever version.
-fn is_pyramid(path: &Path) -> bool {
-    fs::read(path.join(zarr::NODE)).is_ok_and(|bytes| zarr::is_root(&bytes))
-}
-
-/// Refuses what must not be replaced.
-fn check_target(path: &Path, overwrite: bool) -> Result<(), PyramidError> {
-    match path.symlink_metadata() {
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
-        Err(error) => Err(PyramidError::io("looking at", path)(error)),
-        Ok(_) if !is_pyramid(path) => Err(PyramidError::Refused(format!(
-            "{}: exists and is not a Drumlin pyramid; it was left as it is",
-            path.display()
-        ))),
-        Ok(_) if overwrite => Ok(()),
-        Ok(_) => Err(PyramidError::Refused(format!(
-            "{}: a pyramid is there already; ask to overwrite it, or choose another name",
-            path.display()
-        ))),
-    }
-}
-
-/// Ends a replacement that was killed between its steps: the old pyramid gets its name back, or goes.
-fn settle_replacement(path: &Path) -> Result<(), PyramidError> {
-    let replaced = sibling(path, ".replaced");
-    if !is_pyramid(&replaced) {
-        return Ok(());
-    }
-    if path.symlink_metadata().is_ok() {
-        fs::remove_dir_all(&replaced).map_err(PyramidError::io("removing", &replaced))
-    } else {
-        fs::rename(&replaced, path).map_err(PyramidError::io("renaming", &replaced))
-    }
-}
-
-/// Makes the folder of a build, or takes over one that nobody works on; returns its marker, locked.
-fn claim(folder: &Path) -> Result<File, PyramidError> {
-    let marker = folder.join(MARKER);
-    let refused = |what: &str| PyramidError::Refused(format!("{}: {what}", folder.display()));
-    match fs::create_dir(folder) {
-        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-            if !marker.is_file()
-                && !is_pyramid(folder)
-                && fs::read_dir(folder).is_ok_and(|mut it| it.next().is_some())
-            {
-                return Err(refused(
-                    "is in the way of the build, and is not the rest of one",
-                ));
-            }
-        }
-        other => other.map_err(PyramidError::io("creating", folder))?,
-    }
-    let file = File::options()
-        .read(true)
-        .write(true)
-        .create(true)
-        .truncate(false)
-        .open(&marker)
-        .map_err(PyramidError::io("opening", &marker))?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(refused("another process is building this pyramid")),
-        Err(TryLockError::Error(error)) => Err(PyramidError::io("locking", marker)(error)),
-    }
-}
-
-/// Empties a build's folder and says what is being built now.
-fn start_over(folder: &Path, marker: &mut File, fingerprint: &str) -> Result<(), PyramidError> {
-    for name in ["tile", "color", "manifest"] {
-        let path = folder.join(name);
-        match fs::remove_dir_all(&path) {
-            Err(error) if error.kind() == ErrorKind::NotFound => {}
-            other => other.map_err(PyramidError::io("removing", path))?,
-        }
-    }
-    remove_if_there(&folder.join(zarr::NODE))?;
-    let manifest = folder.join("manifest");
-    fs::create_dir(&manifest).map_err(PyramidError::io("creating", manifest))?;
-    marker
-        .set_len(0)
-        .and_then(|()| marker.rewind())
-        .and_then(|()| marker.write_all(fingerprint.as_bytes()))
-        .and_then(|()| marker.sync_all())
-        .map_err(PyramidError::io("writing", folder.join(MARKER)))
-}
-
 /// The shards an interrupted run has finished; a line cut short is the one it was killed in.
 fn read_journal(folder: &Path) -> Result<HashMap<String, ShardInfo>, PyramidError> {
     let path = folder.join(JOURNAL);
@@ -490,13 +347,6 @@ pub(super) fn file_hash(path: &Path) -> std::io::Result<(u64, String)> {
     let mut hasher = blake3::Hasher::new();
     let bytes = std::io::copy(&mut File::open(path)?, &mut hasher)?;
     Ok((bytes, hasher.finalize().to_hex().to_string()))
-}
-
-fn remove_if_there(path: &Path) -> Result<(), PyramidError> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
-        other => other.map_err(PyramidError::io("removing", path)),
-    }
 }
 
 #[cfg(test)]
