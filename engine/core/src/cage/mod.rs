@@ -1,1 +1,22 @@
-//! See the module's plan in ARCHITECTURE.md.
+//! Control cages: free meshes of quads and n-gons with creases, corners and holes, their refinement and limit surface.
+//!
+//! On the route between authored files and `fas` (tables): checks what it is given once, so that nothing below has to.
+//! Knows no table, no tile, no terrain and no file system; OBJ comes and goes as text.
+//!
+//! What is here: [`Cage`] and its [`Topology`], OBJ reading and writing, [`refine`] (plain uniform subdivision, the
+//! oracle of all tables).
+
+mod build;
+mod error;
+mod limit;
+mod obj;
+mod topology;
+mod uniform;
+
+pub use build::{Corner, Crease, Faces, Tags};
+pub use error::CageError;
+
+pub use limit::{LimitSample, LimitSurface, Place};
+pub use obj::{CageBudget, read_obj, write_obj};
+pub use topology::{Cage, NONE, Topology};
+pub use uniform::refine;

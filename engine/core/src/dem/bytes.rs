@@ -25,7 +25,11 @@ impl Bytes {
         if info.len() == 0 {
             return Err(DemError::format(path, "the file is empty"));
         }
-        Ok(Self { file, path: path.to_owned(), len: info.len() })
+        Ok(Self {
+            file,
+            path: path.to_owned(),
+            len: info.len(),
+        })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -38,7 +42,10 @@ impl Bytes {
 
     /// What headers say of the file.
     pub(super) fn source(&self) -> SourceInfo {
-        SourceInfo { name: file_name(&self.path), bytes: self.len }
+        SourceInfo {
+            name: file_name(&self.path),
+            bytes: self.len,
+        }
     }
 
     /// Up to `count` bytes from the start.
@@ -56,7 +63,12 @@ impl Bytes {
     }
 
     /// `count` bytes at `offset`; `what` names them in errors.
-    pub(super) fn read(&self, offset: u64, count: u64, what: impl Fn() -> String) -> Result<Vec<u8>, DemError> {
+    pub(super) fn read(
+        &self,
+        offset: u64,
+        count: u64,
+        what: impl Fn() -> String,
+    ) -> Result<Vec<u8>, DemError> {
         let end = offset.checked_add(count).filter(|&end| end <= self.len);
         let (Some(_), Ok(count)) = (end, usize::try_from(count)) else {
             let what = format!(
@@ -67,7 +79,8 @@ impl Bytes {
             return Err(DemError::format(&self.path, what));
         };
         let mut bytes = vec![0; count];
-        read_exact_at(&self.file, &mut bytes, offset).map_err(|error| DemError::io(&self.path, error))?;
+        read_exact_at(&self.file, &mut bytes, offset)
+            .map_err(|error| DemError::io(&self.path, error))?;
         Ok(bytes)
     }
 }

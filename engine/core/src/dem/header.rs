@@ -23,7 +23,12 @@ impl Window {
     /// All samples of a grid.
     #[must_use]
     pub fn whole(grid: &Grid) -> Self {
-        Self { row: 0, column: 0, rows: grid.rows, columns: grid.columns }
+        Self {
+            row: 0,
+            column: 0,
+            rows: grid.rows,
+            columns: grid.columns,
+        }
     }
 
     /// Samples in it.
@@ -71,14 +76,20 @@ impl RasterHeader {
     /// Checks a window and a buffer against the grid.
     pub(crate) fn check(&self, window: Window, len: usize) -> Result<(), DemError> {
         let grid = &self.grid;
-        let what = if window.row_end() > u64::from(grid.rows) || window.column_end() > u64::from(grid.columns) {
+        let what = if window.row_end() > u64::from(grid.rows)
+            || window.column_end() > u64::from(grid.columns)
+        {
             format!("a raster of {} x {}", grid.rows, grid.columns)
         } else if u64::try_from(len) != Ok(window.sample_count()) {
             format!("a buffer of {len} samples")
         } else {
             return Ok(());
         };
-        Err(DemError::Window { file: self.source.name.clone(), window, what })
+        Err(DemError::Window {
+            file: self.source.name.clone(),
+            window,
+            what,
+        })
     }
 }
 

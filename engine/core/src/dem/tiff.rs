@@ -52,7 +52,15 @@ impl Tiff {
             georeferenced: georef.placement.is_some(),
             source: bytes.source(),
         };
-        Ok(Self { header, bytes, coding, table, scaling, flip, cache: Cache::new(options.cache_bytes()) })
+        Ok(Self {
+            header,
+            bytes,
+            coding,
+            table,
+            scaling,
+            flip,
+            cache: Cache::new(options.cache_bytes()),
+        })
     }
 
     /// Copies what one strip or tile has of a stored window.
@@ -61,10 +69,15 @@ impl Tiff {
         let (rows, columns) = (self.table.chunk_rows, self.table.chunk_columns);
         let index = chunk_row as usize * self.table.across() as usize + chunk_column as usize;
         let part = match self.table.place(index) {
-            Some(place) => Some(self.cache.get(index, || self.table.decode(&self.bytes, &self.coding, index, place))?),
+            Some(place) => Some(self.cache.get(index, || {
+                self.table.decode(&self.bytes, &self.coding, index, place)
+            })?),
             None => None,
         };
-        let first = [u64::from(chunk_row) * u64::from(rows), u64::from(chunk_column) * u64::from(columns)];
+        let first = [
+            u64::from(chunk_row) * u64::from(rows),
+            u64::from(chunk_column) * u64::from(columns),
+        ];
         let shared_rows = overlap(first[0], rows, window.row, window.rows);
         let shared_columns = overlap(first[1], columns, window.column, window.columns);
         for row in shared_rows {
@@ -72,7 +85,8 @@ impl Tiff {
                 + to_usize(shared_columns.start - u64::from(window.column));
             let count = to_usize(shared_columns.end - shared_columns.start);
             let out = &mut out[in_window..in_window + count];
-            let in_chunk = to_usize(row - first[0]) * columns as usize + to_usize(shared_columns.start - first[1]);
+            let in_chunk = to_usize(row - first[0]) * columns as usize
+                + to_usize(shared_columns.start - first[1]);
             match &part {
                 Some(part) => part.heights(in_chunk, &self.scaling, out),
                 None => out.fill(f64::NAN),
@@ -93,7 +107,8 @@ impl Raster for Tiff {
             return Ok(());
         }
         let stored = self.flip.stored(window, &self.header.grid);
-        let rows = stored.row / self.table.chunk_rows..=(stored.row + stored.rows - 1) / self.table.chunk_rows;
+        let rows = stored.row / self.table.chunk_rows
+            ..=(stored.row + stored.rows - 1) / self.table.chunk_rows;
         let first = stored.column / self.table.chunk_columns;
         let last = (stored.column + stored.columns - 1) / self.table.chunk_columns;
         for row in rows {
@@ -125,7 +140,10 @@ fn read_coding(bytes: &Bytes, ifd: &Ifd) -> Result<Coding, DemError> {
         return Err(DemError::unsupported(bytes.path(), what));
     }
     if ifd.short(bytes, tag::PHOTOMETRIC, 1)? == 3 {
-        return Err(DemError::unsupported(bytes.path(), "palette colours (tag 262); heights are needed"));
+        return Err(DemError::unsupported(
+            bytes.path(),
+            "palette colours (tag 262); heights are needed",
+        ));
     }
     let coding = Coding::read(bytes, ifd, 1)?;
     match coding.unsupported() {
@@ -141,7 +159,10 @@ fn read_scaling(
     vertical_unit: Option<f64>,
     options: &OpenOptions,
 ) -> Result<Scaling, DemError> {
-    let metadata = ifd.text(bytes, tag::GDAL_METADATA)?.map(|text| BandMetadata::parse(&text)).unwrap_or_default();
+    let metadata = ifd
+        .text(bytes, tag::GDAL_METADATA)?
+        .map(|text| BandMetadata::parse(&text))
+        .unwrap_or_default();
     let declared = ifd.text(bytes, tag::GDAL_NODATA)?;
     let undeclared = (coding.bits == 16 && coding.format == 2).then_some(UNDECLARED_VOID);
     let nodata = match &declared {

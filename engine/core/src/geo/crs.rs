@@ -25,15 +25,25 @@ pub struct Ellipsoid {
 
 impl Ellipsoid {
     /// The World Geodetic System of 1984.
-    pub const WGS84: Self = Self { semi_major: 6_378_137.0, inverse_flattening: 298.257_223_563 };
+    pub const WGS84: Self = Self {
+        semi_major: 6_378_137.0,
+        inverse_flattening: 298.257_223_563,
+    };
     /// The Moon's reference sphere.
-    pub const MOON: Self = Self { semi_major: 1_737_400.0, inverse_flattening: 0.0 };
+    pub const MOON: Self = Self {
+        semi_major: 1_737_400.0,
+        inverse_flattening: 0.0,
+    };
 
     /// Metres a degree of longitude and a degree of latitude at a latitude in degrees: the ellipsoid's radii of
     /// curvature N cos φ and M, times π / 180.
     #[must_use]
     pub fn metres_per_degree(&self, latitude: f64) -> [f64; 2] {
-        let flattening = if self.inverse_flattening == 0.0 { 0.0 } else { 1.0 / self.inverse_flattening };
+        let flattening = if self.inverse_flattening == 0.0 {
+            0.0
+        } else {
+            1.0 / self.inverse_flattening
+        };
         let e2 = flattening * (2.0 - flattening);
         let (sin, cos) = latitude.to_radians().sin_cos();
         let w2 = 1.0 - e2 * sin * sin;
@@ -62,13 +72,23 @@ impl Crs {
     /// Plane coordinates in metres of which nothing more is known.
     #[must_use]
     pub const fn unknown() -> Self {
-        Self { kind: CrsKind::Unknown, code: None, name: None, ellipsoid: Ellipsoid::WGS84, unit_metres: 1.0 }
+        Self {
+            kind: CrsKind::Unknown,
+            code: None,
+            name: None,
+            ellipsoid: Ellipsoid::WGS84,
+            unit_metres: 1.0,
+        }
     }
 
     /// Longitude and latitude on WGS 84, EPSG:4326.
     #[must_use]
     pub fn wgs84() -> Self {
-        Self { kind: CrsKind::Geographic, code: Some("EPSG:4326".into()), ..Self::unknown() }
+        Self {
+            kind: CrsKind::Geographic,
+            code: Some("EPSG:4326".into()),
+            ..Self::unknown()
+        }
     }
 
     /// True when both mean the same coordinates: equal codes where both have one, else equal in all but the name.
@@ -89,7 +109,11 @@ impl Crs {
     pub fn label(&self) -> &str {
         match self.kind {
             CrsKind::Unknown => "unknown",
-            _ => self.code.as_deref().or(self.name.as_deref()).unwrap_or("unnamed"),
+            _ => self
+                .code
+                .as_deref()
+                .or(self.name.as_deref())
+                .unwrap_or("unnamed"),
         }
     }
 }

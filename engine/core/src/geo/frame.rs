@@ -23,7 +23,9 @@ impl WorldFrame {
             CrsKind::Geographic => crs.ellipsoid.metres_per_degree(y),
             CrsKind::Projected | CrsKind::Unknown => [crs.unit_metres; 2],
         };
-        Self { world_from_crs: [[scale_x, 0.0, -scale_x * x], [0.0, scale_y, -scale_y * y]] }
+        Self {
+            world_from_crs: [[scale_x, 0.0, -scale_x * x], [0.0, scale_y, -scale_y * y]],
+        }
     }
 
     /// World metres of CRS coordinates.
@@ -43,7 +45,10 @@ impl WorldFrame {
     /// World metres of one CRS step: per column of a grid and per row (the second is negative: rows run south).
     #[must_use]
     pub fn step(&self, grid: &Grid) -> [f64; 2] {
-        [self.world_from_crs[0][0] * grid.step[0], self.world_from_crs[1][1] * grid.step[1]]
+        [
+            self.world_from_crs[0][0] * grid.step[0],
+            self.world_from_crs[1][1] * grid.step[1],
+        ]
     }
 }
 
@@ -53,7 +58,12 @@ mod tests {
 
     #[test]
     fn the_centre_is_the_origin_and_the_map_inverts() {
-        let grid = Grid { columns: 1201, rows: 1201, origin: [-122.0, 47.0], step: [1.0 / 1200.0, -1.0 / 1200.0] };
+        let grid = Grid {
+            columns: 1201,
+            rows: 1201,
+            origin: [-122.0, 47.0],
+            step: [1.0 / 1200.0, -1.0 / 1200.0],
+        };
         let frame = WorldFrame::new(&grid, &Crs::wgs84());
         let [x, y] = frame.to_world([-121.5, 46.5]);
         assert!(x.abs() < 1e-6 && y.abs() < 1e-6);

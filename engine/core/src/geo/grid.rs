@@ -32,7 +32,10 @@ impl Extent {
     /// The middle.
     #[must_use]
     pub fn center(&self) -> [f64; 2] {
-        [0.5 * (self.min[0] + self.max[0]), 0.5 * (self.min[1] + self.max[1])]
+        [
+            0.5 * (self.min[0] + self.max[0]),
+            0.5 * (self.min[1] + self.max[1]),
+        ]
     }
 }
 
@@ -55,13 +58,19 @@ impl Grid {
     /// CRS coordinates of a place given in rows and columns, fractions allowed.
     #[must_use]
     pub fn position(&self, row: f64, column: f64) -> [f64; 2] {
-        [self.origin[0] + column * self.step[0], self.origin[1] + row * self.step[1]]
+        [
+            self.origin[0] + column * self.step[0],
+            self.origin[1] + row * self.step[1],
+        ]
     }
 
     /// Row and column, with fractions, of CRS coordinates.
     #[must_use]
     pub fn row_column(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        [(y - self.origin[1]) / self.step[1], (x - self.origin[0]) / self.step[0]]
+        [
+            (y - self.origin[1]) / self.step[1],
+            (x - self.origin[0]) / self.step[0],
+        ]
     }
 
     /// The box around all sample points.
@@ -69,7 +78,10 @@ impl Grid {
     pub fn extent(&self) -> Extent {
         let [x0, y0] = self.origin;
         let [x1, y1] = self.position(f64::from(self.rows) - 1.0, f64::from(self.columns) - 1.0);
-        Extent { min: [x0.min(x1), y0.min(y1)], max: [x0.max(x1), y0.max(y1)] }
+        Extent {
+            min: [x0.min(x1), y0.min(y1)],
+            max: [x0.max(x1), y0.max(y1)],
+        }
     }
 
     /// Rows and columns of tiles that cover the grid at its finest level; at least one of each.
@@ -135,7 +147,10 @@ impl Grid {
         let [row, column] = self.first_sample(tile).map(|first| first as f64);
         let [x0, y0] = self.position(row, column);
         let [x1, y1] = self.position(row + span, column + span);
-        Extent { min: [x0.min(x1), y0.min(y1)], max: [x0.max(x1), y0.max(y1)] }
+        Extent {
+            min: [x0.min(x1), y0.min(y1)],
+            max: [x0.max(x1), y0.max(y1)],
+        }
     }
 }
 
@@ -144,12 +159,23 @@ mod tests {
     use super::*;
 
     fn grid(rows: u32, columns: u32) -> Grid {
-        Grid { columns, rows, origin: [10.0, 50.0], step: [0.5, -0.25] }
+        Grid {
+            columns,
+            rows,
+            origin: [10.0, 50.0],
+            step: [0.5, -0.25],
+        }
     }
 
     #[test]
     fn level_zero_is_one_tile() {
-        for (rows, columns, levels) in [(1, 1, 1), (129, 129, 1), (130, 2, 2), (1201, 1201, 5), (8192, 8192, 7)] {
+        for (rows, columns, levels) in [
+            (1, 1, 1),
+            (129, 129, 1),
+            (130, 2, 2),
+            (1201, 1201, 5),
+            (8192, 8192, 7),
+        ] {
             let grid = grid(rows, columns);
             assert_eq!(grid.level_count(), levels);
             assert_eq!(grid.tiles(0), [1, 1]);

@@ -34,7 +34,11 @@ pub struct TileId {
 
 impl TileId {
     /// The one tile of level 0.
-    pub const ROOT: Self = Self { level: 0, row: 0, column: 0 };
+    pub const ROOT: Self = Self {
+        level: 0,
+        row: 0,
+        column: 0,
+    };
 
     /// The tile at `row`, `column` of `level`.
     #[must_use]
@@ -52,7 +56,11 @@ impl TileId {
     /// The child in a quadrant (0 north-west, 1 north-east, 2 south-west, 3 south-east).
     #[must_use]
     pub const fn child(self, quadrant: u32) -> Self {
-        Self::new(self.level + 1, self.row * 2 + quadrant / 2, self.column * 2 + quadrant % 2)
+        Self::new(
+            self.level + 1,
+            self.row * 2 + quadrant / 2,
+            self.column * 2 + quadrant % 2,
+        )
     }
 
     /// All four children, whether or not the pyramid has them, in the order of their quadrants.

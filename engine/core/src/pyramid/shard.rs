@@ -325,7 +325,7 @@ mod tests {
     #[test]
     fn sections_change_the_frame_and_not_what_it_holds() {
         let bytes: Vec<u8> = (0..30_000_u32)
-            .map(|i| ((i * i >> 7) & 0x1f).to_le_bytes()[0])
+            .map(|i| (((i * i) >> 7) & 0x1f).to_le_bytes()[0])
             .collect();
         for sections in [
             &[][..],

@@ -60,7 +60,9 @@ impl Tile {
     #[must_use]
     pub fn is_void(&self, row: usize, column: usize) -> bool {
         let bit = row * crate::geo::TILE_SAMPLES + column;
-        self.voids.as_ref().is_some_and(|bits| bits[bit / 8] >> (bit % 8) & 1 == 1)
+        self.voids
+            .as_ref()
+            .is_some_and(|bits| bits[bit / 8] >> (bit % 8) & 1 == 1)
     }
 
     /// Bytes in memory, for budgets.

@@ -142,7 +142,20 @@ fn summarise(heights: &[i32], voids: usize, error: f32, children: &[Summary; 4])
 
 fn patch_codes(errors: &TileErrors, tile_error: f32, unit: f64) -> Vec<u8> {
     let base = tile_error.max(ceil_f32(unit));
-    let nibble = |error: f64| patch_nibble(error * unit, base);
+    let mode: u32 = std::env::var("EXP").map_or(0, |v| v.parse().unwrap());
+    let nibble = |error: f64| {
+        let n = patch_nibble(error * unit, base);
+        match mode {
+            1 => n.next_multiple_of(2).min(15),
+            2 => n.next_multiple_of(3).min(15),
+            3 => 15,
+            4 if tile_error == 0.0 => 15,
+            5 if tile_error == 0.0 => n.next_multiple_of(2).min(15),
+            6 if tile_error == 0.0 => n.next_multiple_of(2).max(6).min(15),
+            7 if tile_error == 0.0 => if n <= 6 { 6 } else { n.next_multiple_of(3).min(15) },
+            _ => n,
+        }
+    };
     errors
         .patches
         .iter()
