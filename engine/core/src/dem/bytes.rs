@@ -1,6 +1,6 @@
 //! A file that many threads read at once, every read checked against its length before memory is taken for it.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -17,15 +17,20 @@ pub(super) struct Bytes {
 impl Bytes {
     /// Opens a file of at least one byte.
     pub(super) fn open(path: &Path) -> Result<Self, DemError> {
-        let file = File::open(path).map_err(|error| DemError::io(path, error))?;
-        let info = file.metadata().map_err(|error| DemError::io(path, error))?;
+        // Looked at before it is opened: opening a pipe would wait for a writer.
+        let info = fs::metadata(path).map_err(|error| DemError::io(path, error))?;
         if !info.is_file() {
             return Err(DemError::format(path, "is not a regular file"));
         }
         if info.len() == 0 {
             return Err(DemError::format(path, "the file is empty"));
         }
-        Ok(Self { file, path: path.to_owned(), len: info.len() })
+        let file = File::open(path).map_err(|error| DemError::io(path, error))?;
+        Ok(Self {
+            file,
+            path: path.to_owned(),
+            len: info.len(),
+        })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -38,7 +43,10 @@ impl Bytes {
 
     /// What headers say of the file.
     pub(super) fn source(&self) -> SourceInfo {
-        SourceInfo { name: file_name(&self.path), bytes: self.len }
+        SourceInfo {
+            name: file_name(&self.path),
+            bytes: self.len,
+        }
     }
 
     /// Up to `count` bytes from the start.
@@ -56,7 +64,12 @@ impl Bytes {
     }
 
     /// `count` bytes at `offset`; `what` names them in errors.
-    pub(super) fn read(&self, offset: u64, count: u64, what: impl Fn() -> String) -> Result<Vec<u8>, DemError> {
+    pub(super) fn read(
+        &self,
+        offset: u64,
+        count: u64,
+        what: impl Fn() -> String,
+    ) -> Result<Vec<u8>, DemError> {
         let end = offset.checked_add(count).filter(|&end| end <= self.len);
         let (Some(_), Ok(count)) = (end, usize::try_from(count)) else {
             let what = format!(
@@ -67,7 +80,8 @@ impl Bytes {
             return Err(DemError::format(&self.path, what));
         };
         let mut bytes = vec![0; count];
-        read_exact_at(&self.file, &mut bytes, offset).map_err(|error| DemError::io(&self.path, error))?;
+        read_exact_at(&self.file, &mut bytes, offset)
+            .map_err(|error| DemError::io(&self.path, error))?;
         Ok(bytes)
     }
 }

@@ -23,8 +23,15 @@ struct Kept {
 
 impl Cache {
     pub(super) fn new(budget_bytes: usize) -> Self {
-        let kept = Kept { parts: LruCache::unbounded(), bytes: 0 };
-        Self { kept: Mutex::new(kept), doors: Default::default(), budget_bytes }
+        let kept = Kept {
+            parts: LruCache::unbounded(),
+            bytes: 0,
+        };
+        Self {
+            kept: Mutex::new(kept),
+            doors: Default::default(),
+            budget_bytes,
+        }
     }
 
     /// A part, decoded by `decode` unless it is there; two threads never decode the same part at once.
@@ -37,7 +44,9 @@ impl Cache {
             return Ok(part);
         }
         // A panic elsewhere leaves nothing half-done behind these locks.
-        let _door = self.doors[index % DOORS].lock().unwrap_or_else(PoisonError::into_inner);
+        let _door = self.doors[index % DOORS]
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         if let Some(part) = self.find(index) {
             return Ok(part);
         }
@@ -47,7 +56,12 @@ impl Cache {
     }
 
     fn find(&self, index: usize) -> Option<Arc<Samples>> {
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner).parts.get(&index).cloned()
+        self.kept
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .parts
+            .get(&index)
+            .cloned()
     }
 
     fn keep(&self, index: usize, part: &Arc<Samples>) {
@@ -57,7 +71,9 @@ impl Cache {
             kept.bytes -= old.byte_len();
         }
         while kept.bytes > self.budget_bytes && kept.parts.len() > 1 {
-            let Some((_, oldest)) = kept.parts.pop_lru() else { break };
+            let Some((_, oldest)) = kept.parts.pop_lru() else {
+                break;
+            };
             kept.bytes -= oldest.byte_len();
         }
     }
@@ -74,7 +90,11 @@ mod tests {
         for index in [0, 1, 0, 2] {
             cache.get(index, || part(0)).expect("decodes");
         }
-        let again = |index| cache.get(index, || part(9)).map(|part| *part == Samples::U8(vec![9; 4]));
+        let again = |index| {
+            cache
+                .get(index, || part(9))
+                .map(|part| *part == Samples::U8(vec![9; 4]))
+        };
         assert!(!again(0).expect("kept") && !again(2).expect("kept"));
         assert!(again(1).expect("decoded again"));
     }

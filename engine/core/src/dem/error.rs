@@ -70,23 +70,39 @@ pub enum DemError {
 
 impl DemError {
     pub(crate) fn io(path: &Path, source: io::Error) -> Self {
-        Self::Io { file: file_name(path), source }
+        Self::Io {
+            file: file_name(path),
+            source,
+        }
     }
 
     pub(crate) fn format(path: &Path, what: impl Into<String>) -> Self {
-        Self::Format { file: file_name(path), what: what.into() }
+        Self::Format {
+            file: file_name(path),
+            what: what.into(),
+        }
     }
 
     pub(crate) fn unsupported(path: &Path, what: impl Into<String>) -> Self {
-        Self::Unsupported { file: file_name(path), what: what.into() }
+        Self::Unsupported {
+            file: file_name(path),
+            what: what.into(),
+        }
     }
 
     pub(crate) fn limit(path: &Path, what: impl Into<String>, limit: impl Into<String>) -> Self {
-        Self::Limit { file: file_name(path), what: what.into(), limit: limit.into() }
+        Self::Limit {
+            file: file_name(path),
+            what: what.into(),
+            limit: limit.into(),
+        }
     }
 }
 
 /// The last part of a path, for messages.
 pub(crate) fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+    path.file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy()
+        .into_owned()
 }

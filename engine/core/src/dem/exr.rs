@@ -30,10 +30,21 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
     let damaged = |error: Error| DemError::format(bytes.path(), format!("EXR: {error}"));
     let file = bytes.whole(MAX_FILE_BYTES)?;
     let meta = MetaData::read_from_buffered(Cursor::new(&file), false).map_err(damaged)?;
-    let header = meta.headers.first().ok_or_else(|| DemError::format(bytes.path(), "EXR: no layer"))?;
+    let header = meta
+        .headers
+        .first()
+        .ok_or_else(|| DemError::format(bytes.path(), "EXR: no layer"))?;
     check(bytes, header)?;
-    let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
-    let image = image.non_parallel().from_buffered(Cursor::new(&file)).map_err(damaged)?;
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes();
+    let image = image
+        .non_parallel()
+        .from_buffered(Cursor::new(&file))
+        .map_err(damaged)?;
     let size = image.layer_data.size;
     let channels = image.layer_data.channel_data.list;
     let named = |name: &str| channels.iter().position(|channel| channel.name.eq(name));
@@ -42,8 +53,15 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
         let what = format!("EXR of {} channels, none named Y, R or Z", channels.len());
         return Err(DemError::unsupported(bytes.path(), what));
     };
-    let (samples, whole) = match channels.into_iter().nth(index).map(|channel| channel.sample_data) {
-        Some(FlatSamples::F16(v)) => (Samples::F32(v.into_iter().map(|x| x.to_f32()).collect()), false),
+    let (samples, whole) = match channels
+        .into_iter()
+        .nth(index)
+        .map(|channel| channel.sample_data)
+    {
+        Some(FlatSamples::F16(v)) => (
+            Samples::F32(v.into_iter().map(|x| x.to_f32()).collect()),
+            false,
+        ),
         Some(FlatSamples::F32(v)) => (Samples::F32(v), false),
         Some(FlatSamples::U32(v)) => (Samples::U32(v), true),
         None => return Err(DemError::format(bytes.path(), "EXR: no samples")),
@@ -57,7 +75,7 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
         whole,
         scaling: Scaling::new(options.nodata, options.scale.unwrap_or(1.0), 0.0),
     };
-    Memory::new(bytes, options, parts, samples)
+    Memory::raster(bytes, options, parts, samples)
 }
 
 /// Refuses a data window that the file cannot fill or memory cannot hold, before any is taken.
@@ -67,11 +85,22 @@ fn check(bytes: &Bytes, header: &Header) -> Result<(), DemError> {
     let pixel_bytes = header.channels.bytes_per_pixel as u64;
     check_size(bytes.path(), columns, rows, pixel_bytes.max(4))?;
     if columns * rows * pixel_bytes / MAX_EXPANSION > bytes.len() {
-        let what = format!("EXR: a data window of {columns} x {rows} in a file of {} bytes", bytes.len());
+        let what = format!(
+            "EXR: a data window of {columns} x {rows} in a file of {} bytes",
+            bytes.len()
+        );
         return Err(DemError::format(bytes.path(), what));
     }
-    if header.channels.list.iter().any(|channel| channel.sampling.0 != 1 || channel.sampling.1 != 1) {
-        return Err(DemError::unsupported(bytes.path(), "EXR: subsampled channels"));
+    if header
+        .channels
+        .list
+        .iter()
+        .any(|channel| channel.sampling.0 != 1 || channel.sampling.1 != 1)
+    {
+        return Err(DemError::unsupported(
+            bytes.path(),
+            "EXR: subsampled channels",
+        ));
     }
     Ok(())
 }

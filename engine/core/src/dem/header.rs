@@ -1,5 +1,7 @@
 //! What is known of a raster before any sample is read, and how a caller helps where the file is silent.
 
+use std::path::Path;
+
 use super::DemError;
 use crate::geo::{Crs, Grid};
 
@@ -23,7 +25,12 @@ impl Window {
     /// All samples of a grid.
     #[must_use]
     pub fn whole(grid: &Grid) -> Self {
-        Self { row: 0, column: 0, rows: grid.rows, columns: grid.columns }
+        Self {
+            row: 0,
+            column: 0,
+            rows: grid.rows,
+            columns: grid.columns,
+        }
     }
 
     /// Samples in it.
@@ -71,14 +78,20 @@ impl RasterHeader {
     /// Checks a window and a buffer against the grid.
     pub(crate) fn check(&self, window: Window, len: usize) -> Result<(), DemError> {
         let grid = &self.grid;
-        let what = if window.row_end() > u64::from(grid.rows) || window.column_end() > u64::from(grid.columns) {
+        let what = if window.row_end() > u64::from(grid.rows)
+            || window.column_end() > u64::from(grid.columns)
+        {
             format!("a raster of {} x {}", grid.rows, grid.columns)
         } else if u64::try_from(len) != Ok(window.sample_count()) {
             format!("a buffer of {len} samples")
         } else {
             return Ok(());
         };
-        Err(DemError::Window { file: self.source.name.clone(), window, what })
+        Err(DemError::Window {
+            file: self.source.name.clone(),
+            window,
+            what,
+        })
     }
 }
 
@@ -96,6 +109,23 @@ pub struct OpenOptions {
 }
 
 impl OpenOptions {
+    /// Refuses numbers that would make no grid and no heights.
+    pub(crate) fn check(&self, path: &Path) -> Result<(), DemError> {
+        let senseless = |what: &str, value: f64| {
+            Err(DemError::format(
+                path,
+                format!("cannot be read with a {what} of {value}"),
+            ))
+        };
+        match (self.spacing, self.scale) {
+            (Some(spacing), _) if !(spacing.is_finite() && spacing > 0.0) => {
+                senseless("spacing", spacing)
+            }
+            (_, Some(scale)) if !scale.is_normal() => senseless("scale", scale),
+            _ => Ok(()),
+        }
+    }
+
     /// The budget for decoded strips and tiles.
     pub(crate) fn cache_bytes(&self) -> usize {
         self.cache_bytes.unwrap_or(64 << 20)

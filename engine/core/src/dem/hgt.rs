@@ -17,9 +17,13 @@ const SIZES: [(u32, u32); 4] = [(3601, 3601), (1201, 1201), (121, 121), (1801, 3
 
 /// Opens a tile.
 pub(super) fn open(bytes: Bytes, options: &OpenOptions) -> Result<Box<dyn Raster>, DemError> {
-    let size = |&(columns, rows): &(u32, u32)| u64::from(columns) * u64::from(rows) * 2 == bytes.len();
+    let size =
+        |&(columns, rows): &(u32, u32)| u64::from(columns) * u64::from(rows) * 2 == bytes.len();
     let Some(&(columns, rows)) = SIZES.iter().find(|pair| size(pair)) else {
-        let what = format!("{} bytes are no SRTM tile of 3601, 1201 or 121 samples a side", bytes.len());
+        let what = format!(
+            "{} bytes are no SRTM tile of 3601, 1201 or 121 samples a side",
+            bytes.len()
+        );
         return Err(DemError::format(bytes.path(), what));
     };
     let Some([south, west]) = place(&file_name(bytes.path())) else {
@@ -27,17 +31,29 @@ pub(super) fn open(bytes: Bytes, options: &OpenOptions) -> Result<Box<dyn Raster
         return Err(DemError::format(bytes.path(), what));
     };
     let step = [columns, rows].map(|count| 1.0 / f64::from(count - 1));
-    let placement = Placement { origin: [west, south + 1.0], step: [step[0], -step[1]] };
+    let placement = Placement {
+        origin: [west, south + 1.0],
+        step: [step[0], -step[1]],
+    };
     let parts = Parts {
         columns,
         rows,
         placement: Some(placement),
         crs: Crs::wgs84(),
         whole: true,
-        scaling: Scaling::new(options.nodata.or(Some(VOID)), options.scale.unwrap_or(1.0), 0.0),
+        scaling: Scaling::new(
+            options.nodata.or(Some(VOID)),
+            options.scale.unwrap_or(1.0),
+            0.0,
+        ),
     };
-    let rows = Rows { offset: 0, stride: u64::from(columns) * 2, kind: SampleType::I16, big_endian: true };
-    Plain::new(bytes, options, parts, rows)
+    let rows = Rows {
+        offset: 0,
+        stride: u64::from(columns) * 2,
+        kind: SampleType::I16,
+        big_endian: true,
+    };
+    Plain::raster(bytes, options, parts, rows)
 }
 
 /// Latitude and longitude of the south-west corner, from a name as `N46W122.hgt` or `s05e010.SRTMGL1.hgt`.
@@ -50,7 +66,10 @@ fn place(name: &str) -> Option<[f64; 2]> {
         letter if letter == minus => Some(-1.0),
         _ => None,
     };
-    let place = [sign(0, b'N', b'S')? * f64::from(latitude), sign(3, b'E', b'W')? * f64::from(longitude)];
+    let place = [
+        sign(0, b'N', b'S')? * f64::from(latitude),
+        sign(3, b'E', b'W')? * f64::from(longitude),
+    ];
     (latitude <= 90 && longitude <= 180).then_some(place)
 }
 
@@ -62,7 +81,13 @@ mod tests {
     fn a_tile_s_place_is_in_its_name() {
         assert_eq!(place("N46W122.hgt"), Some([46.0, -122.0]));
         assert_eq!(place("s05e010.SRTMGL1.hgt"), Some([-5.0, 10.0]));
-        for name in ["rainier.hgt", "N4", "X46W122.hgt", "N99W122.hgt", "ÄN46W122"] {
+        for name in [
+            "rainier.hgt",
+            "N4",
+            "X46W122.hgt",
+            "N99W122.hgt",
+            "ÄN46W122",
+        ] {
             assert_eq!(place(name), None, "{name}");
         }
     }

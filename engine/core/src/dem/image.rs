@@ -43,14 +43,26 @@ pub fn open_image(path: &Path) -> Result<Image, DemError> {
     let format = match format {
         Some(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Tiff)) => format,
         _ if Ifd::matches(&bytes.head(8)?) => ImageFormat::Tiff,
-        _ => return Err(DemError::format(path, "not an image: neither PNG nor JPEG nor TIFF")),
+        _ => {
+            return Err(DemError::format(
+                path,
+                "not an image: neither PNG nor JPEG nor TIFF",
+            ));
+        }
     };
     let (georef, (width, height, mut rgb)) = if format == ImageFormat::Tiff {
         let ifd = Ifd::read(&bytes)?;
         (Georef::read(&bytes, &ifd)?, read_picture(&bytes, &ifd)?)
     } else {
         let placement = world_file::find(path)?;
-        (Georef { placement, crs: Crs::unknown(), vertical_unit: None }, decode(&bytes, format)?)
+        (
+            Georef {
+                placement,
+                crs: Crs::unknown(),
+                vertical_unit: None,
+            },
+            decode(&bytes, format)?,
+        )
     };
     let mut extent = None;
     if let Some(placement) = georef.placement {
@@ -63,7 +75,13 @@ pub fn open_image(path: &Path) -> Result<Image, DemError> {
             max: [max[0] + half[0], max[1] + half[1]],
         });
     }
-    Ok(Image { width, height, rgb, extent, crs: georef.crs })
+    Ok(Image {
+        width,
+        height,
+        rgb,
+        extent,
+        crs: georef.crs,
+    })
 }
 
 /// Width, height and pixels of a PNG or JPEG.
@@ -76,7 +94,9 @@ fn decode(bytes: &Bytes, format: ImageFormat) -> Result<(u32, u32, Vec<[u8; 3]>)
     let decoder = reader.into_decoder().map_err(damaged)?;
     let (width, height) = decoder.dimensions();
     check_size(bytes, width.into(), height.into())?;
-    let pixels = DynamicImage::from_decoder(decoder).map_err(damaged)?.into_rgb8();
+    let pixels = DynamicImage::from_decoder(decoder)
+        .map_err(damaged)?
+        .into_rgb8();
     Ok((width, height, pixels.into_raw().as_chunks().0.to_vec()))
 }
 
@@ -84,15 +104,26 @@ fn decode(bytes: &Bytes, format: ImageFormat) -> Result<(u32, u32, Vec<[u8; 3]>)
 pub(super) fn check_size(bytes: &Bytes, width: u64, height: u64) -> Result<(), DemError> {
     if width.max(height) > MAX_SIDE {
         let what = format!("an image of {width} x {height} pixels");
-        return Err(DemError::limit(bytes.path(), what, format!("{MAX_SIDE} pixels a side")));
+        return Err(DemError::limit(
+            bytes.path(),
+            what,
+            format!("{MAX_SIDE} pixels a side"),
+        ));
     }
     let size = width * height * 3;
     if size > MAX_BYTES {
         let what = format!("an image of {width} x {height} pixels, {size} bytes,");
-        return Err(DemError::limit(bytes.path(), what, format!("{MAX_BYTES} bytes")));
+        return Err(DemError::limit(
+            bytes.path(),
+            what,
+            format!("{MAX_BYTES} bytes"),
+        ));
     }
     if size / MAX_EXPANSION > bytes.len() {
-        let what = format!("{} bytes cannot hold {width} x {height} pixels", bytes.len());
+        let what = format!(
+            "{} bytes cannot hold {width} x {height} pixels",
+            bytes.len()
+        );
         return Err(DemError::format(bytes.path(), what));
     }
     Ok(())

@@ -19,7 +19,7 @@ pub(super) struct Memory {
     flip: Flip,
 }
 
-/// What a format's reader knows of a raster, to be completed by [`Memory::new`].
+/// What a format's reader knows of a raster, to be completed by [`Memory::raster`].
 pub(super) struct Parts {
     pub(super) columns: u32,
     pub(super) rows: u32,
@@ -33,7 +33,11 @@ pub(super) struct Parts {
 
 impl Parts {
     /// The header, and how stored windows are turned.
-    pub(super) fn header(self, bytes: &Bytes, options: &OpenOptions) -> Result<(RasterHeader, Flip), DemError> {
+    pub(super) fn header(
+        self,
+        bytes: &Bytes,
+        options: &OpenOptions,
+    ) -> Result<(RasterHeader, Flip), DemError> {
         let placement = self.placement.unwrap_or(Placement::unknown(options));
         let (grid, flip) = placement.grid(bytes.path(), self.columns, self.rows)?;
         let header = RasterHeader {
@@ -49,7 +53,7 @@ impl Parts {
 
 impl Memory {
     /// A raster of samples in stored order.
-    pub(super) fn new(
+    pub(super) fn raster(
         bytes: &Bytes,
         options: &OpenOptions,
         parts: Parts,
@@ -57,7 +61,12 @@ impl Memory {
     ) -> Result<Box<dyn Raster>, DemError> {
         let scaling = parts.scaling;
         let (header, flip) = parts.header(bytes, options)?;
-        Ok(Box::new(Self { header, samples, scaling, flip }))
+        Ok(Box::new(Self {
+            header,
+            samples,
+            scaling,
+            flip,
+        }))
     }
 }
 
@@ -70,7 +79,9 @@ impl Raster for Memory {
         self.header.check(window, out.len())?;
         let grid = &self.header.grid;
         let stored = self.flip.stored(window, grid);
-        for (row, out) in (stored.row as usize..).zip(out.chunks_exact_mut(stored.columns.max(1) as usize)) {
+        for (row, out) in
+            (stored.row as usize..).zip(out.chunks_exact_mut(stored.columns.max(1) as usize))
+        {
             let first = row * grid.columns as usize + stored.column as usize;
             self.samples.heights(first, &self.scaling, out);
         }
@@ -80,10 +91,18 @@ impl Raster for Memory {
 }
 
 /// Refuses rasters that would take too much memory, before any is taken.
-pub(super) fn check_size(path: &Path, columns: u64, rows: u64, sample_bytes: u64) -> Result<(), DemError> {
-    let total = columns.checked_mul(rows).and_then(|count| count.checked_mul(sample_bytes));
+pub(super) fn check_size(
+    path: &Path,
+    columns: u64,
+    rows: u64,
+    sample_bytes: u64,
+) -> Result<(), DemError> {
+    let total = columns
+        .checked_mul(rows)
+        .and_then(|count| count.checked_mul(sample_bytes));
     if total.is_none_or(|total| total > MAX_BYTES) {
-        let what = format!("a raster of {columns} x {rows} samples of {sample_bytes} bytes, read whole,");
+        let what =
+            format!("a raster of {columns} x {rows} samples of {sample_bytes} bytes, read whole,");
         return Err(DemError::limit(path, what, format!("{MAX_BYTES} bytes")));
     }
     Ok(())

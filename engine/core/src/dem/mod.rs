@@ -6,8 +6,10 @@
 //! looks at what a file holds rather than at its name. Row 0 is north and column 0 is west whatever the file says;
 //! void is NaN; whole numbers of metres come out exactly.
 
+mod ascii;
 mod bytes;
 mod cache;
+mod dted;
 mod error;
 mod exr;
 mod header;
@@ -18,11 +20,14 @@ mod mosaic;
 mod placement;
 mod plain;
 mod png;
+mod raw;
 mod samples;
 #[cfg(test)]
 mod tests;
 mod tiff;
 mod units;
+mod usgs;
+mod wkt;
 mod world_file;
 
 use std::path::Path;
@@ -52,8 +57,9 @@ pub trait Raster: Send + Sync {
 /// # Errors
 /// [`DemError`], naming the file, the place in it and the limit.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Raster>, DemError> {
+    options.check(path)?;
     let bytes = Bytes::open(path)?;
-    let head = bytes.head(64)?;
+    let head = bytes.head(1024)?;
     if Ifd::matches(&head) {
         return Ok(Box::new(Tiff::open(bytes, options)?));
     }
@@ -63,9 +69,28 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Box<dyn Raster>, DemEr
     if exr::matches(&head) {
         return exr::open(&bytes, options);
     }
-    // An SRTM tile has nothing but its name and length to be told by.
-    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("hgt")) {
+    if dted::matches(&head) {
+        return dted::open(&bytes, options);
+    }
+    if ascii::matches(&head) {
+        return ascii::open(&bytes, options);
+    }
+    if usgs::matches(&head) {
+        return usgs::open(&bytes, options);
+    }
+    // These have nothing to be told by but their names and what lies beside them.
+    if path
+        .extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("hgt"))
+    {
         return hgt::open(bytes, options);
     }
-    Err(DemError::format(path, "not an elevation model: neither GeoTIFF, PNG, EXR nor SRTM (.hgt)"))
+    if let Some(header) = raw::header_beside(path) {
+        return raw::open(bytes, &header, options);
+    }
+    let known = "GeoTIFF, SRTM (.hgt), PNG, EXR, DTED, ESRI ASCII grid, USGS DEM, or .flt and .bil with .hdr";
+    Err(DemError::format(
+        path,
+        format!("not an elevation model of a known format ({known})"),
+    ))
 }

@@ -27,45 +27,42 @@ impl Mosaic {
     /// [`DemError::Format`] when none are given, or one of several says nothing of where it lies.
     pub fn new(rasters: Vec<Box<dyn Raster>>) -> Result<Self, DemError> {
         let Some(first) = rasters.first().map(|raster| raster.header().clone()) else {
-            return Err(DemError::Format { file: "mosaic".into(), what: "no rasters given".into() });
+            return Err(DemError::Format {
+                file: "mosaic".into(),
+                what: "no rasters given".into(),
+            });
         };
         let mut places = Vec::new();
         for raster in &rasters {
             check_fits(&first, raster.header(), rasters.len())?;
             places.push(lattice_place(&first, raster.header())?);
         }
-        let sizes = rasters.iter().map(|raster| [raster.header().grid.rows, raster.header().grid.columns]);
-        let ends = places.iter().zip(sizes).map(|(place, size)| [0, 1].map(|i| place[i] + i64::from(size[i])));
-        let start = places.iter().fold([i64::MAX; 2], |a, b| [a[0].min(b[0]), a[1].min(b[1])]);
-        let end = ends.fold([i64::MIN; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
-        let last = &rasters[rasters.len() - 1].header().source.name;
-        let side = |axis: usize| -> Result<u32, DemError> {
-            let count = u32::try_from(end[axis] - start[axis]).ok().filter(|&count| count <= MAX_SIDE);
-            let what = "they lie too far apart for one grid";
-            count.ok_or_else(|| mismatch(&first.source.name, last, what))
-        };
-        let grid = Grid {
-            rows: side(0)?,
-            columns: side(1)?,
-            origin: first.grid.position(start[0] as f64, start[1] as f64),
-            step: first.grid.step,
-        };
+        let (start, grid) = union(&first, &rasters, &places)?;
         let headers = || rasters.iter().map(|raster| raster.header());
         let header = RasterHeader {
             grid,
             crs: first.crs.clone(),
             integer: headers().all(|header| header.integer),
             georeferenced: first.georeferenced,
-            source: SourceInfo { name: name(&rasters), bytes: headers().map(|header| header.source.bytes).sum() },
+            source: SourceInfo {
+                name: name(&rasters),
+                bytes: headers().map(|header| header.source.bytes).sum(),
+            },
         };
         // Each lies within the grid just made, so the offsets fit.
         let offset = |place: i64, start: i64| u32::try_from(place - start).unwrap_or(0);
-        let parts = rasters.into_iter().zip(places).map(|(raster, [row, column])| Part {
-            raster,
-            row: offset(row, start[0]),
-            column: offset(column, start[1]),
-        });
-        Ok(Self { header, parts: parts.collect() })
+        let parts = rasters
+            .into_iter()
+            .zip(places)
+            .map(|(raster, [row, column])| Part {
+                raster,
+                row: offset(row, start[0]),
+                column: offset(column, start[1]),
+            });
+        Ok(Self {
+            header,
+            parts: parts.collect(),
+        })
     }
 }
 
@@ -80,13 +77,19 @@ impl Raster for Mosaic {
         let mut heights = Vec::new();
         // The last given first: what it leaves void, the others may fill.
         for part in self.parts.iter().rev() {
-            let Some(shared) = part.shared(window) else { continue };
+            let Some(shared) = part.shared(window) else {
+                continue;
+            };
             let places = || (0..shared.rows).map(|row| place(shared, window, row));
             if !places().any(|place| out[place].iter().any(|height| height.is_nan())) {
                 continue;
             }
             heights.resize(shared.rows as usize * shared.columns as usize, 0.0);
-            let own = Window { row: shared.row - part.row, column: shared.column - part.column, ..shared };
+            let own = Window {
+                row: shared.row - part.row,
+                column: shared.column - part.column,
+                ..shared
+            };
             part.raster.read(own, &mut heights)?;
             for (place, heights) in places().zip(heights.chunks_exact(shared.columns as usize)) {
                 for (out, &height) in out[place].iter_mut().zip(heights) {
@@ -115,6 +118,41 @@ impl Part {
     }
 }
 
+/// The least row and column of the rasters in the first one's lattice, and the grid around all.
+fn union(
+    first: &RasterHeader,
+    rasters: &[Box<dyn Raster>],
+    places: &[[i64; 2]],
+) -> Result<([i64; 2], Grid), DemError> {
+    let (mut start, mut end) = ([i64::MAX; 2], [i64::MIN; 2]);
+    for (raster, place) in rasters.iter().zip(places) {
+        let grid = &raster.header().grid;
+        for (axis, count) in [grid.rows, grid.columns].into_iter().enumerate() {
+            start[axis] = start[axis].min(place[axis]);
+            end[axis] = end[axis].max(place[axis] + i64::from(count));
+        }
+        if [0, 1]
+            .iter()
+            .any(|&axis| end[axis] - start[axis] > i64::from(MAX_SIDE))
+        {
+            let what = "they lie too far apart for one grid";
+            return Err(mismatch(
+                &first.source.name,
+                &raster.header().source.name,
+                what,
+            ));
+        }
+    }
+    let count = |axis: usize| u32::try_from(end[axis] - start[axis]).unwrap_or(MAX_SIDE);
+    let grid = Grid {
+        rows: count(0),
+        columns: count(1),
+        origin: first.grid.position(start[0] as f64, start[1] as f64),
+        step: first.grid.step,
+    };
+    Ok((start, grid))
+}
+
 /// Where in a window's buffer a row of a smaller window lies.
 fn place(shared: Window, window: Window, row: u32) -> std::ops::Range<usize> {
     let first = (shared.row - window.row + row) as usize * window.columns as usize;
@@ -124,25 +162,41 @@ fn place(shared: Window, window: Window, row: u32) -> std::ops::Range<usize> {
 
 fn name(rasters: &[Box<dyn Raster>]) -> String {
     let first = &rasters[0].header().source.name;
-    if rasters.len() == 1 { first.clone() } else { format!("{first} and {} more", rasters.len() - 1) }
+    if rasters.len() == 1 {
+        first.clone()
+    } else {
+        format!("{first} and {} more", rasters.len() - 1)
+    }
 }
 
 fn mismatch(first: &str, second: &str, what: impl Into<String>) -> DemError {
-    DemError::Mismatch { first: first.into(), second: second.into(), what: what.into() }
+    DemError::Mismatch {
+        first: first.into(),
+        second: second.into(),
+        what: what.into(),
+    }
 }
 
 fn check_fits(first: &RasterHeader, other: &RasterHeader, count: usize) -> Result<(), DemError> {
     if count > 1 && !other.georeferenced {
         let what = "it does not say where it lies, so it cannot be put beside others".into();
-        return Err(DemError::Format { file: other.source.name.clone(), what });
+        return Err(DemError::Format {
+            file: other.source.name.clone(),
+            what,
+        });
     }
     if !first.crs.same_as(&other.crs) {
-        let what = format!("their coordinate systems are {} and {}", first.crs.label(), other.crs.label());
+        let what = format!(
+            "their coordinate systems are {} and {}",
+            first.crs.label(),
+            other.crs.label()
+        );
         return Err(mismatch(&first.source.name, &other.source.name, what));
     }
     for axis in [0, 1] {
         let (a, b) = (first.grid.step[axis], other.grid.step[axis]);
-        let samples = [&first.grid, &other.grid].map(|grid| if axis == 0 { grid.columns } else { grid.rows });
+        let samples =
+            [&first.grid, &other.grid].map(|grid| if axis == 0 { grid.columns } else { grid.rows });
         let drift = (a - b).abs() / a.abs() * f64::from(samples[0].max(samples[1]));
         if drift > LATTICE_TOLERANCE {
             let what = format!("their samples are {} and {} apart", a.abs(), b.abs());
@@ -157,14 +211,23 @@ fn lattice_place(first: &RasterHeader, other: &RasterHeader) -> Result<[i64; 2],
     let place = first.grid.row_column(other.grid.origin);
     for value in place {
         if value.abs() > f64::from(u32::MAX) {
-            return Err(mismatch(&first.source.name, &other.source.name, "they lie too far apart for one grid"));
+            return Err(mismatch(
+                &first.source.name,
+                &other.source.name,
+                "they lie too far apart for one grid",
+            ));
         }
         if (value - value.round()).abs() > LATTICE_TOLERANCE {
             let off = (value - value.round()).abs();
-            let what = format!("their samples do not lie on one lattice (off by {off:.3} of a step); resample one");
+            let what = format!(
+                "their samples do not lie on one lattice (off by {off:.3} of a step); resample one"
+            );
             return Err(mismatch(&first.source.name, &other.source.name, what));
         }
     }
-    #[expect(clippy::cast_possible_truncation, reason = "within 32 bits, as was just checked")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "within 32 bits, as was just checked"
+    )]
     Ok(place.map(|value| value.round() as i64))
 }

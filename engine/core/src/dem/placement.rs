@@ -25,7 +25,10 @@ impl Placement {
     /// For files that say nothing: from (0, 0), by the caller's spacing.
     pub(super) fn unknown(options: &OpenOptions) -> Self {
         let spacing = options.spacing.unwrap_or(1.0);
-        Self { origin: [0.0; 2], step: [spacing, -spacing] }
+        Self {
+            origin: [0.0; 2],
+            step: [spacing, -spacing],
+        }
     }
 
     /// A placement whose numbers make sense, or what does not.
@@ -34,29 +37,59 @@ impl Placement {
         if self.origin.iter().chain(&self.step).all(|v| v.is_finite()) && x != 0.0 && y != 0.0 {
             Ok(self)
         } else {
-            Err(format!("a grid from {:?} by steps of {:?} has no places", self.origin, self.step))
+            Err(format!(
+                "a grid from {:?} by steps of {:?} has no places",
+                self.origin, self.step
+            ))
         }
     }
 
     /// The grid of so many stored columns and rows, and how to turn stored windows into its own.
-    pub(super) fn grid(self, path: &Path, columns: u32, rows: u32) -> Result<(Grid, Flip), DemError> {
+    pub(super) fn grid(
+        self,
+        path: &Path,
+        columns: u32,
+        rows: u32,
+    ) -> Result<(Grid, Flip), DemError> {
         let placement = self.check().map_err(|what| DemError::format(path, what))?;
         if columns == 0 || rows == 0 {
-            return Err(DemError::format(path, format!("{columns} x {rows} samples are none")));
+            return Err(DemError::format(
+                path,
+                format!("{columns} x {rows} samples are none"),
+            ));
         }
         if columns > MAX_SIDE || rows > MAX_SIDE {
             let what = format!("a raster of {columns} x {rows} samples");
-            return Err(DemError::limit(path, what, format!("{MAX_SIDE} samples a side")));
+            return Err(DemError::limit(
+                path,
+                what,
+                format!("{MAX_SIDE} samples a side"),
+            ));
         }
-        let flip = Flip { rows: placement.step[1] > 0.0, columns: placement.step[0] < 0.0 };
+        let flip = Flip {
+            rows: placement.step[1] > 0.0,
+            columns: placement.step[0] < 0.0,
+        };
         let last = [columns, rows].map(|count| f64::from(count - 1));
         let flipped = [flip.columns, flip.rows];
         let origin = [0, 1].map(|axis| {
-            let shift = if flipped[axis] { last[axis] * placement.step[axis] } else { 0.0 };
+            let shift = if flipped[axis] {
+                last[axis] * placement.step[axis]
+            } else {
+                0.0
+            };
             placement.origin[axis] + shift
         });
         let step = [placement.step[0].abs(), -placement.step[1].abs()];
-        Ok((Grid { columns, rows, origin, step }, flip))
+        Ok((
+            Grid {
+                columns,
+                rows,
+                origin,
+                step,
+            },
+            flip,
+        ))
     }
 }
 
@@ -85,7 +118,9 @@ impl Flip {
 
     fn turn_rows<T>(self, columns: usize, samples: &mut [T]) {
         if self.columns {
-            samples.chunks_exact_mut(columns.max(1)).for_each(<[T]>::reverse);
+            samples
+                .chunks_exact_mut(columns.max(1))
+                .for_each(<[T]>::reverse);
         }
         if self.rows && columns > 0 {
             let mut rest = samples;
@@ -106,12 +141,17 @@ mod tests {
 
     /// A stored 3 × 2 raster 0, 1 / 2, 3 / 4, 5 read through a flip.
     fn read(step: [f64; 2], window: Window) -> (Grid, Vec<f64>) {
-        let placement = Placement { origin: [10.0, 20.0], step };
+        let placement = Placement {
+            origin: [10.0, 20.0],
+            step,
+        };
         let (grid, flip) = placement.grid(Path::new("x"), 2, 3).expect("a fine grid");
         let stored = flip.stored(window, &grid);
         let mut out = Vec::new();
         for row in stored.row..stored.row + stored.rows {
-            out.extend((0..stored.columns).map(|column| f64::from(row * 2 + stored.column + column)));
+            out.extend(
+                (0..stored.columns).map(|column| f64::from(row * 2 + stored.column + column)),
+            );
         }
         flip.turn(window, &mut out);
         (grid, out)
@@ -119,7 +159,12 @@ mod tests {
 
     #[test]
     fn rows_from_the_south_and_columns_from_the_east_are_turned() {
-        let whole = Window { row: 0, column: 0, rows: 3, columns: 2 };
+        let whole = Window {
+            row: 0,
+            column: 0,
+            rows: 3,
+            columns: 2,
+        };
         let (grid, heights) = read([1.0, 1.0], whole);
         assert_eq!((grid.origin, grid.step), ([10.0, 22.0], [1.0, -1.0]));
         assert_eq!(heights, [4.0, 5.0, 2.0, 3.0, 0.0, 1.0]);
@@ -131,7 +176,12 @@ mod tests {
 
     #[test]
     fn windows_are_turned_too() {
-        let south = Window { row: 1, column: 1, rows: 2, columns: 1 };
+        let south = Window {
+            row: 1,
+            column: 1,
+            rows: 2,
+            columns: 1,
+        };
         assert_eq!(read([1.0, 1.0], south).1, [3.0, 1.0]);
         assert_eq!(read([1.0, -1.0], south).1, [3.0, 5.0]);
     }

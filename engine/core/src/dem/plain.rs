@@ -28,7 +28,7 @@ pub(super) struct Plain {
 
 impl Plain {
     /// Checks that all rows lie in the file.
-    pub(super) fn new(
+    pub(super) fn raster(
         bytes: Bytes,
         options: &OpenOptions,
         parts: Parts,
@@ -50,7 +50,13 @@ impl Plain {
             );
             return Err(DemError::format(bytes.path(), what));
         }
-        Ok(Box::new(Self { header, bytes, rows, scaling, flip }))
+        Ok(Box::new(Self {
+            header,
+            bytes,
+            rows,
+            scaling,
+            flip,
+        }))
     }
 }
 
@@ -62,11 +68,20 @@ impl Raster for Plain {
     fn read(&self, window: Window, out: &mut [f64]) -> Result<(), DemError> {
         self.header.check(window, out.len())?;
         let stored = self.flip.stored(window, &self.header.grid);
-        let Rows { offset, stride, kind, big_endian } = self.rows;
+        let Rows {
+            offset,
+            stride,
+            kind,
+            big_endian,
+        } = self.rows;
         let size = u64::from(kind.bytes());
-        for (row, out) in (u64::from(stored.row)..).zip(out.chunks_exact_mut(stored.columns.max(1) as usize)) {
+        for (row, out) in
+            (u64::from(stored.row)..).zip(out.chunks_exact_mut(stored.columns.max(1) as usize))
+        {
             let at = offset + row * stride + u64::from(stored.column) * size;
-            let data = self.bytes.read(at, u64::from(stored.columns) * size, || format!("row {row}"))?;
+            let data = self.bytes.read(at, u64::from(stored.columns) * size, || {
+                format!("row {row}")
+            })?;
             Samples::from_bytes(&data, kind, big_endian).heights(0, &self.scaling, out);
         }
         self.flip.turn(window, out);

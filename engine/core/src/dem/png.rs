@@ -21,9 +21,11 @@ pub(super) fn matches(head: &[u8]) -> bool {
 
 /// Reads a height map.
 pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raster>, DemError> {
-    let damaged = |error: ::image::ImageError| DemError::format(bytes.path(), format!("PNG: {error}"));
+    let damaged =
+        |error: ::image::ImageError| DemError::format(bytes.path(), format!("PNG: {error}"));
     let file = bytes.whole(MAX_FILE_BYTES)?;
-    let decoder = PngDecoder::with_limits(Cursor::new(file), Limits::no_limits()).map_err(damaged)?;
+    let decoder =
+        PngDecoder::with_limits(Cursor::new(file), Limits::no_limits()).map_err(damaged)?;
     let (columns, rows) = decoder.dimensions();
     let kind = match (decoder.original_color_type(), decoder.color_type()) {
         (ExtendedColorType::L8, ColorType::L8) => SampleType::U8,
@@ -33,8 +35,16 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
             return Err(DemError::unsupported(bytes.path(), what));
         }
     };
-    check_size(bytes.path(), columns.into(), rows.into(), kind.bytes().into())?;
-    check_plausible(bytes, u64::from(columns) * u64::from(rows) * u64::from(kind.bytes()))?;
+    check_size(
+        bytes.path(),
+        columns.into(),
+        rows.into(),
+        kind.bytes().into(),
+    )?;
+    check_plausible(
+        bytes,
+        u64::from(columns) * u64::from(rows) * u64::from(kind.bytes()),
+    )?;
     let mut data = vec![0; usize::try_from(decoder.total_bytes()).unwrap_or(usize::MAX)];
     decoder.read_image(&mut data).map_err(damaged)?;
     // The decoder gives numbers in this machine's byte order.
@@ -47,7 +57,7 @@ pub(super) fn open(bytes: &Bytes, options: &OpenOptions) -> Result<Box<dyn Raste
         whole: true,
         scaling: Scaling::new(options.nodata, options.scale.unwrap_or(1.0), 0.0),
     };
-    Memory::new(bytes, options, parts, samples)
+    Memory::raster(bytes, options, parts, samples)
 }
 
 /// Deflate makes at most 1,032 bytes of one.

@@ -46,15 +46,30 @@ pub(super) struct Scaling {
 
 impl Scaling {
     /// Stored numbers are metres and none is void.
-    pub(super) const METRES: Self = Self { nodata: None, scale: 1.0, divisor: 1.0, offset: 0.0 };
+    pub(super) const METRES: Self = Self {
+        nodata: None,
+        scale: 1.0,
+        divisor: 1.0,
+        offset: 0.0,
+    };
 
     /// Numbers of so many metres a unit.
     pub(super) fn new(nodata: Option<f64>, scale: f64, offset: f64) -> Self {
         let whole = scale.recip().round();
         if scale < 1.0 && (scale * whole - 1.0).abs() < 1e-12 {
-            Self { nodata, scale: 1.0, divisor: whole, offset }
+            Self {
+                nodata,
+                scale: 1.0,
+                divisor: whole,
+                offset,
+            }
         } else {
-            Self { nodata, scale, divisor: 1.0, offset }
+            Self {
+                nodata,
+                scale,
+                divisor: 1.0,
+                offset,
+            }
         }
     }
 
@@ -74,9 +89,15 @@ impl Scaling {
 
     /// The same, with the void mark rounded to what an f32 can hold.
     fn for_f32(self) -> Self {
-        #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what is asked for")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "rounding to f32 is what is asked for"
+        )]
         let round = |value: f64| f64::from(value as f32);
-        Self { nodata: self.nodata.map(round), ..self }
+        Self {
+            nodata: self.nodata.map(round),
+            ..self
+        }
     }
 }
 
@@ -125,7 +146,11 @@ impl Samples {
         macro_rules! numbers {
             ($variant:ident, $type:ty) => {{
                 let chunks = bytes.as_chunks().0.iter().copied();
-                let from = if big_endian { <$type>::from_be_bytes } else { <$type>::from_le_bytes };
+                let from = if big_endian {
+                    <$type>::from_be_bytes
+                } else {
+                    <$type>::from_le_bytes
+                };
                 Self::$variant(chunks.map(from).collect())
             }};
         }
@@ -167,14 +192,18 @@ mod tests {
     fn void_is_what_the_file_says_and_what_is_no_height() {
         let scaling = Scaling::new(Some(-9999.0), 0.1, -5.0);
         let mut out = [0.0; 5];
-        Samples::F32(vec![-9999.0, f32::NAN, f32::INFINITY, f32::MIN, 50.0]).heights(0, &scaling, &mut out);
+        Samples::F32(vec![-9999.0, f32::NAN, f32::INFINITY, f32::MIN, 50.0])
+            .heights(0, &scaling, &mut out);
         assert!(out[..4].iter().all(|height| height.is_nan()));
         assert_eq!(out[4], 0.0);
     }
 
     #[test]
     fn a_void_mark_that_an_f32_cannot_hold_still_matches() {
-        let scaling = Scaling { nodata: Some(-9999.1), ..Scaling::METRES };
+        let scaling = Scaling {
+            nodata: Some(-9999.1),
+            ..Scaling::METRES
+        };
         let mut out = [0.0];
         Samples::F32(vec![-9999.1]).heights(0, &scaling, &mut out);
         assert!(out[0].is_nan());
@@ -182,7 +211,10 @@ mod tests {
 
     #[test]
     fn whole_numbers_come_out_exactly_in_either_byte_order() {
-        for (big_endian, bytes) in [(true, [0xff, 0xfe, 0x12, 0x34]), (false, [0xfe, 0xff, 0x34, 0x12])] {
+        for (big_endian, bytes) in [
+            (true, [0xff, 0xfe, 0x12, 0x34]),
+            (false, [0xfe, 0xff, 0x34, 0x12]),
+        ] {
             let samples = Samples::from_bytes(&bytes, SampleType::I16, big_endian);
             assert_eq!(samples, Samples::I16(vec![-2, 0x1234]));
         }

@@ -25,7 +25,8 @@ pub(super) fn from_name(name: &str) -> Option<f64> {
     Some(match name.as_str() {
         "m" | "metre" | "meter" | "metres" | "meters" => 1.0,
         "ft" | "foot" | "feet" | "international foot" => FOOT,
-        "ftus" | "us-ft" | "sft" | "us survey foot" | "us survey feet" | "foot_us" | "us_survey_foot" => US_FOOT,
+        "ftus" | "us-ft" | "sft" | "us survey foot" | "us survey feet" | "foot_us"
+        | "us_survey_foot" => US_FOOT,
         "cm" | "centimetre" | "centimeter" => 0.01,
         "dm" | "decimetre" | "decimeter" => 0.1,
         "km" | "kilometre" | "kilometer" => 1000.0,

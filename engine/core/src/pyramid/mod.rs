@@ -6,9 +6,9 @@ pub mod build;
 mod error;
 mod files;
 mod metadata;
+mod patch_code;
 mod query;
 mod reader;
-mod patch_code;
 mod record;
 #[cfg(test)]
 mod sample;
@@ -25,9 +25,9 @@ mod zarr_python;
 
 pub use error::PyramidError;
 pub use metadata::{ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};
+pub use patch_code::{HALF_OCTAVES, NEVER, patch_error, patch_nibble};
 pub use query::Heights;
 pub use reader::Pyramid;
-pub use patch_code::{HALF_OCTAVES, NEVER, patch_error, patch_nibble};
 pub use record::{Record, RecordLayout, RecordParts, VOID_BYTES, number_bytes};
 pub use shard::{SHARD_TILES, shard_count, shard_shape};
 pub use store::{FaultStore, Faults, FileStore, MappedStore, Store, StoreError};

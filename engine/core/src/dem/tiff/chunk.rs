@@ -41,7 +41,10 @@ impl Coding {
     /// Reads it from the tags; `bands` are the numbers of a sample that lie together.
     pub(super) fn read(bytes: &Bytes, ifd: &Ifd, bands: u16) -> Result<Self, DemError> {
         if ifd.short(bytes, tag::FILL_ORDER, 1)? != 1 {
-            return Err(DemError::unsupported(bytes.path(), "reversed bits (tag 266)"));
+            return Err(DemError::unsupported(
+                bytes.path(),
+                "reversed bits (tag 266)",
+            ));
         }
         let compression = ifd.short(bytes, tag::COMPRESSION, 1)?;
         // Only these have a predictor; writers leave the tag in other files, and readers pass over it.
@@ -49,7 +52,11 @@ impl Coding {
         Ok(Self {
             big_endian: ifd.big_endian,
             compression,
-            predictor: if predicted { ifd.short(bytes, tag::PREDICTOR, 1)? } else { 1 },
+            predictor: if predicted {
+                ifd.short(bytes, tag::PREDICTOR, 1)?
+            } else {
+                1
+            },
             bits: ifd.short(bytes, tag::BITS, 1)?,
             // Format 4 is "undefined"; everyone reads it as unsigned.
             format: match ifd.short(bytes, tag::SAMPLE_FORMAT, 1)? {
@@ -90,11 +97,20 @@ impl Coding {
                 5 | 6 => "complex numbers",
                 _ => "an unknown sample format",
             };
-            return Some(format!("samples of {} bits, {kind} (tags 258, 339)", self.bits));
+            return Some(format!(
+                "samples of {} bits, {kind} (tags 258, 339)",
+                self.bits
+            ));
         }
-        if !matches!(self.compression, NONE | LZW | DEFLATE | OLD_DEFLATE | PACK_BITS | ZSTD) {
+        if !matches!(
+            self.compression,
+            NONE | LZW | DEFLATE | OLD_DEFLATE | PACK_BITS | ZSTD
+        ) {
             let name = compression_name(self.compression);
-            return Some(format!("{name} compression ({}, tag 259)", self.compression));
+            return Some(format!(
+                "{name} compression ({}, tag 259)",
+                self.compression
+            ));
         }
         let predictor = match self.predictor {
             1 | 2 => true,
@@ -118,21 +134,30 @@ impl Coding {
     /// Whether so many stored bytes can hold so many numbers.
     pub(super) fn is_plausible(&self, stored_bytes: u64, sample_count: u64) -> bool {
         // A few bytes of slack: codes of a fraction of a byte, headers.
-        let most = stored_bytes.saturating_add(16).saturating_mul(self.expansion());
+        let most = stored_bytes
+            .saturating_add(16)
+            .saturating_mul(self.expansion());
         sample_count.saturating_mul(self.bytes()) <= most
     }
 
     /// The numbers of the `rows` × `columns` samples of a strip or tile.
-    pub(super) fn decode(&self, stored: Vec<u8>, rows: u32, columns: u32) -> Result<Samples, String> {
+    pub(super) fn decode(
+        &self,
+        stored: Vec<u8>,
+        rows: u32,
+        columns: u32,
+    ) -> Result<Samples, String> {
         if let Some(kind) = self.plain_type() {
             return self.decode_plain(&stored, kind, rows, columns);
         }
-        let size = usize::try_from(u64::from(rows) * u64::from(columns) * self.bytes()).map_err(|e| e.to_string())?;
+        let size = usize::try_from(u64::from(rows) * u64::from(columns) * self.bytes())
+            .map_err(|e| e.to_string())?;
         let mut limits = Limits::default();
         limits.decoding_buffer_size = size;
         limits.intermediate_buffer_size = stored.len().max(size);
         let file = Cursor::new(self.wrap(stored, rows, columns)?);
-        let decoded = Decoder::new(file).and_then(|decoder| decoder.with_limits(limits).read_chunk(0));
+        let decoded =
+            Decoder::new(file).and_then(|decoder| decoder.with_limits(limits).read_chunk(0));
         decoded.map(from_decoded).map_err(|error| message(&error))
     }
 
@@ -152,10 +177,19 @@ impl Coding {
         }
     }
 
-    fn decode_plain(&self, stored: &[u8], kind: SampleType, rows: u32, columns: u32) -> Result<Samples, String> {
+    fn decode_plain(
+        &self,
+        stored: &[u8],
+        kind: SampleType,
+        rows: u32,
+        columns: u32,
+    ) -> Result<Samples, String> {
         let size = u64::from(rows) * u64::from(columns) * self.bytes();
-        let bytes = usize::try_from(size).ok().and_then(|size| stored.get(..size));
-        let bytes = bytes.ok_or_else(|| format!("{} bytes where {size} are needed", stored.len()))?;
+        let bytes = usize::try_from(size)
+            .ok()
+            .and_then(|size| stored.get(..size));
+        let bytes =
+            bytes.ok_or_else(|| format!("{} bytes where {size} are needed", stored.len()))?;
         Ok(Samples::from_bytes(bytes, kind, self.big_endian))
     }
 
@@ -178,8 +212,20 @@ impl Coding {
             (317, self.predictor.into()),
             (339, self.format.into()),
         ];
-        let put16 = |value: u16| if self.big_endian { value.to_be_bytes() } else { value.to_le_bytes() };
-        let put32 = |value: u32| if self.big_endian { value.to_be_bytes() } else { value.to_le_bytes() };
+        let put16 = |value: u16| {
+            if self.big_endian {
+                value.to_be_bytes()
+            } else {
+                value.to_le_bytes()
+            }
+        };
+        let put32 = |value: u32| {
+            if self.big_endian {
+                value.to_be_bytes()
+            } else {
+                value.to_le_bytes()
+            }
+        };
         let mut file = Vec::with_capacity(DATA_AT as usize + stored.len());
         file.extend(if self.big_endian { *b"MM" } else { *b"II" });
         file.extend(put16(42));
@@ -242,7 +288,14 @@ mod tests {
     use super::*;
 
     fn coding(compression: u16) -> Coding {
-        Coding { big_endian: false, compression, predictor: 1, bits: 16, format: 2, bands: 1 }
+        Coding {
+            big_endian: false,
+            compression,
+            predictor: 1,
+            bits: 16,
+            format: 2,
+            bands: 1,
+        }
     }
 
     #[test]
@@ -254,19 +307,49 @@ mod tests {
 
     #[test]
     fn half_floats_and_both_byte_orders_decode() {
-        let half = Coding { format: 3, ..coding(NONE) };
-        assert_eq!(half.decode(vec![0x00, 0x3c], 1, 1), Ok(Samples::F32(vec![1.0])));
-        let big = Coding { big_endian: true, ..coding(NONE) };
-        assert_eq!(big.decode(vec![0xff, 0xfe], 1, 1), Ok(Samples::I16(vec![-2])));
+        let half = Coding {
+            format: 3,
+            ..coding(NONE)
+        };
+        assert_eq!(
+            half.decode(vec![0x00, 0x3c], 1, 1),
+            Ok(Samples::F32(vec![1.0]))
+        );
+        let big = Coding {
+            big_endian: true,
+            ..coding(NONE)
+        };
+        assert_eq!(
+            big.decode(vec![0xff, 0xfe], 1, 1),
+            Ok(Samples::I16(vec![-2]))
+        );
     }
 
     #[test]
     fn what_is_not_read_is_named() {
-        let complex = Coding { format: 5, ..coding(NONE) };
-        assert!(complex.unsupported().is_some_and(|what| what.contains("complex")));
-        assert!(coding(34887).unsupported().is_some_and(|what| what.contains("LERC")));
-        let predictor = Coding { predictor: 3, ..coding(DEFLATE) };
-        assert!(predictor.unsupported().is_some_and(|what| what.contains("predictor 3")));
+        let complex = Coding {
+            format: 5,
+            ..coding(NONE)
+        };
+        assert!(
+            complex
+                .unsupported()
+                .is_some_and(|what| what.contains("complex"))
+        );
+        assert!(
+            coding(34887)
+                .unsupported()
+                .is_some_and(|what| what.contains("LERC"))
+        );
+        let predictor = Coding {
+            predictor: 3,
+            ..coding(DEFLATE)
+        };
+        assert!(
+            predictor
+                .unsupported()
+                .is_some_and(|what| what.contains("predictor 3"))
+        );
     }
 
     #[test]

@@ -40,24 +40,34 @@ impl GeoKeys {
     /// Reads the keys; a file without them has none.
     pub(super) fn read(bytes: &Bytes, ifd: &Ifd) -> Result<Self, DemError> {
         let mut keys = Self::default();
-        let Some(directory) = ifd.numbers(bytes, tag::GEO_KEYS)? else { return Ok(keys) };
+        let Some(directory) = ifd.numbers(bytes, tag::GEO_KEYS)? else {
+            return Ok(keys);
+        };
         let doubles = ifd.doubles(bytes, tag::GEO_DOUBLES)?.unwrap_or_default();
         let text = ifd.text(bytes, tag::GEO_TEXT)?.unwrap_or_default();
-        let directory: Vec<u16> = directory.iter().filter_map(|&v| u16::try_from(v).ok()).collect();
+        let directory: Vec<u16> = directory
+            .iter()
+            .filter_map(|&v| u16::try_from(v).ok())
+            .collect();
         for entry in directory.chunks_exact(4).skip(1) {
-            let &[key, place, count, value] = entry else { continue };
+            let &[key, place, count, value] = entry else {
+                continue;
+            };
             let at = usize::from(value);
             match place {
                 0 => drop(keys.shorts.insert(key, value)),
                 tag::GEO_DOUBLES => {
-                    let Some(&value) = doubles.get(at) else { return Err(cut_off(bytes, key)) };
+                    let Some(&value) = doubles.get(at) else {
+                        return Err(cut_off(bytes, key));
+                    };
                     keys.doubles.insert(key, value);
                 }
                 tag::GEO_TEXT => {
                     // A tolerated slip: counts one past the end, for the NUL.
                     let end = (at + usize::from(count)).min(text.len());
                     let value = text.get(at..end).ok_or_else(|| cut_off(bytes, key))?;
-                    keys.texts.insert(key, value.trim_end_matches(['|', '\0', ' ']).to_owned());
+                    keys.texts
+                        .insert(key, value.trim_end_matches(['|', '\0', ' ']).to_owned());
                 }
                 _ => {}
             }
@@ -72,14 +82,23 @@ impl GeoKeys {
 
     /// Metres a unit of height, where the keys say it.
     pub(super) fn vertical_unit(&self) -> Option<f64> {
-        let unit = self.shorts.get(&VERTICAL_UNIT).and_then(|&code| units::from_code(code));
-        unit.or_else(|| self.shorts.get(&VERTICAL).and_then(|&code| units::of_vertical_reference(code)))
+        let unit = self
+            .shorts
+            .get(&VERTICAL_UNIT)
+            .and_then(|&code| units::from_code(code));
+        unit.or_else(|| {
+            self.shorts
+                .get(&VERTICAL)
+                .and_then(|&code| units::of_vertical_reference(code))
+        })
     }
 
     /// The coordinate system, or what is not supported of it.
     pub(super) fn crs(&self) -> Result<Crs, String> {
-        let projected = self.shorts.contains_key(&PROJECTED) || self.shorts.contains_key(&LINEAR_UNIT);
-        let geographic = self.shorts.contains_key(&GEOGRAPHIC) || self.doubles.contains_key(&SEMI_MAJOR);
+        let projected =
+            self.shorts.contains_key(&PROJECTED) || self.shorts.contains_key(&LINEAR_UNIT);
+        let geographic =
+            self.shorts.contains_key(&GEOGRAPHIC) || self.doubles.contains_key(&SEMI_MAJOR);
         match self.shorts.get(&MODEL_TYPE) {
             Some(1) if projected => self.projected(),
             Some(2) if geographic => self.geographic(),
@@ -94,7 +113,11 @@ impl GeoKeys {
     fn geographic(&self) -> Result<Crs, String> {
         match self.shorts.get(&ANGULAR_UNIT) {
             None | Some(9102 | 9122) => {}
-            Some(unit) => return Err(format!("angles in unit {unit} (GeoKey 2054); only degrees are read")),
+            Some(unit) => {
+                return Err(format!(
+                    "angles in unit {unit} (GeoKey 2054); only degrees are read"
+                ));
+            }
         }
         Ok(Crs {
             kind: CrsKind::Geographic,
@@ -109,7 +132,7 @@ impl GeoKeys {
         let unit_metres = match self.shorts.get(&LINEAR_UNIT) {
             Some(&USER_DEFINED) => self.doubles.get(&LINEAR_UNIT_METRES).copied(),
             Some(&code) => units::from_code(code),
-            None => Some(1.0),
+            None => Some(self.named_unit()),
         };
         let unit_metres = unit_metres.filter(|unit| unit.is_finite() && *unit > 0.0);
         let unit_metres = unit_metres.ok_or("an unknown unit of length (GeoKeys 3076, 3077)")?;
@@ -122,8 +145,25 @@ impl GeoKeys {
         })
     }
 
+    /// The unit of a system whose keys name none: its name tells feet, as in "NAD83 / California zone 6 (ftUS)".
+    fn named_unit(&self) -> f64 {
+        let name = self
+            .name([PROJECTED_CITATION, CITATION])
+            .unwrap_or_default();
+        if name.contains("(ftUS)") {
+            units::US_FOOT
+        } else if name.contains("(ft)") {
+            units::FOOT
+        } else {
+            1.0
+        }
+    }
+
     fn code(&self, key: u16) -> Option<String> {
-        let code = self.shorts.get(&key).filter(|&&code| code != USER_DEFINED && code != 0)?;
+        let code = self
+            .shorts
+            .get(&key)
+            .filter(|&&code| code != USER_DEFINED && code != 0)?;
         Some(format!("EPSG:{code}"))
     }
 
@@ -131,27 +171,54 @@ impl GeoKeys {
     fn name(&self, keys: [u16; 2]) -> Option<String> {
         let text = keys.iter().find_map(|key| self.texts.get(key))?;
         let first = text.split('|').next().unwrap_or(text).trim();
-        let name = first.rsplit_once(" = ").map_or(first, |(_, name)| name).trim();
+        let name = first
+            .rsplit_once(" = ")
+            .map_or(first, |(_, name)| name)
+            .trim();
         (!name.is_empty()).then(|| name.to_owned())
     }
 
     fn ellipsoid(&self) -> Ellipsoid {
-        if let Some(&semi_major) = self.doubles.get(&SEMI_MAJOR).filter(|&&a| a.is_finite() && a > 0.0) {
-            let from_minor = self.doubles.get(&SEMI_MINOR).map(|minor| inverse_flattening(semi_major, *minor));
-            let given = self.doubles.get(&INVERSE_FLATTENING).copied().filter(|f| f.is_finite());
+        if let Some(&semi_major) = self
+            .doubles
+            .get(&SEMI_MAJOR)
+            .filter(|&&a| a.is_finite() && a > 0.0)
+        {
+            let from_minor = self
+                .doubles
+                .get(&SEMI_MINOR)
+                .map(|minor| inverse_flattening(semi_major, *minor));
+            let given = self
+                .doubles
+                .get(&INVERSE_FLATTENING)
+                .copied()
+                .filter(|f| f.is_finite());
             let inverse_flattening = given.or(from_minor).unwrap_or(0.0);
-            return Ellipsoid { semi_major, inverse_flattening };
+            return Ellipsoid {
+                semi_major,
+                inverse_flattening,
+            };
         }
-        known_ellipsoid(self.shorts.get(&ELLIPSOID).copied(), self.shorts.get(&GEOGRAPHIC).copied())
+        known_ellipsoid(
+            self.shorts.get(&ELLIPSOID).copied(),
+            self.shorts.get(&GEOGRAPHIC).copied(),
+        )
     }
 }
 
 fn cut_off(bytes: &Bytes, key: u16) -> DemError {
-    DemError::format(bytes.path(), format!("the value of GeoKey {key} is cut off"))
+    DemError::format(
+        bytes.path(),
+        format!("the value of GeoKey {key} is cut off"),
+    )
 }
 
 fn inverse_flattening(semi_major: f64, semi_minor: f64) -> f64 {
-    if semi_major == semi_minor { 0.0 } else { semi_major / (semi_major - semi_minor) }
+    if semi_major == semi_minor {
+        0.0
+    } else {
+        semi_major / (semi_major - semi_minor)
+    }
 }
 
 /// The ellipsoid of an EPSG ellipsoid code, or of a geographic system's; WGS 84's where neither is known.
@@ -164,7 +231,10 @@ fn known_ellipsoid(ellipsoid: Option<u16>, geographic: Option<u16>) -> Ellipsoid
         (Some(7001), _) | (_, Some(4277)) => (6_377_563.396, 299.324_964_6),
         _ => return Ellipsoid::WGS84,
     };
-    Ellipsoid { semi_major, inverse_flattening }
+    Ellipsoid {
+        semi_major,
+        inverse_flattening,
+    }
 }
 
 #[cfg(test)]
@@ -174,21 +244,50 @@ mod tests {
     #[test]
     fn the_moon_is_a_sphere_with_a_name_and_no_code() {
         let mut keys = GeoKeys::default();
-        keys.shorts.extend([(MODEL_TYPE, 2), (GEOGRAPHIC, USER_DEFINED), (ANGULAR_UNIT, 9102)]);
-        keys.doubles.extend([(SEMI_MAJOR, 1_737_400.0), (SEMI_MINOR, 1_737_400.0)]);
-        keys.texts.insert(GEOGRAPHIC_CITATION, "GCS Name = Moon 2000|Datum = D_Moon_2000".into());
+        keys.shorts.extend([
+            (MODEL_TYPE, 2),
+            (GEOGRAPHIC, USER_DEFINED),
+            (ANGULAR_UNIT, 9102),
+        ]);
+        keys.doubles
+            .extend([(SEMI_MAJOR, 1_737_400.0), (SEMI_MINOR, 1_737_400.0)]);
+        keys.texts.insert(
+            GEOGRAPHIC_CITATION,
+            "GCS Name = Moon 2000|Datum = D_Moon_2000".into(),
+        );
         let crs = keys.crs().expect("a sphere is supported");
         assert_eq!((crs.kind, crs.code.as_deref()), (CrsKind::Geographic, None));
-        assert_eq!((crs.name.as_deref(), crs.ellipsoid), (Some("Moon 2000"), Ellipsoid::MOON));
+        assert_eq!(
+            (crs.name.as_deref(), crs.ellipsoid),
+            (Some("Moon 2000"), Ellipsoid::MOON)
+        );
     }
 
     #[test]
     fn feet_are_feet() {
         let mut keys = GeoKeys::default();
-        keys.shorts.extend([(MODEL_TYPE, 1), (PROJECTED, 2927), (LINEAR_UNIT, 9003), (VERTICAL_UNIT, 9002)]);
+        keys.shorts.extend([
+            (MODEL_TYPE, 1),
+            (PROJECTED, 2927),
+            (LINEAR_UNIT, 9003),
+            (VERTICAL_UNIT, 9002),
+        ]);
         let crs = keys.crs().expect("feet are supported");
-        assert_eq!((crs.code.as_deref(), crs.unit_metres), (Some("EPSG:2927"), units::US_FOOT));
+        assert_eq!(
+            (crs.code.as_deref(), crs.unit_metres),
+            (Some("EPSG:2927"), units::US_FOOT)
+        );
         assert_eq!(keys.vertical_unit(), Some(units::FOOT));
+    }
+
+    #[test]
+    fn a_system_without_a_unit_may_name_it() {
+        let mut keys = GeoKeys::default();
+        keys.shorts.extend([(MODEL_TYPE, 1), (PROJECTED, 2230)]);
+        assert_eq!(keys.crs().map(|crs| crs.unit_metres), Ok(1.0));
+        keys.texts
+            .insert(CITATION, "NAD83 / California zone 6 (ftUS)".into());
+        assert_eq!(keys.crs().map(|crs| crs.unit_metres), Ok(units::US_FOOT));
     }
 
     #[test]

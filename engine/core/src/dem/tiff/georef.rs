@@ -21,16 +21,26 @@ impl Georef {
     /// Reads it from the tags of a directory.
     pub(in super::super) fn read(bytes: &Bytes, ifd: &Ifd) -> Result<Self, DemError> {
         let keys = GeoKeys::read(bytes, ifd)?;
-        let crs = keys.crs().map_err(|what| DemError::unsupported(bytes.path(), what))?;
+        let crs = keys
+            .crs()
+            .map_err(|what| DemError::unsupported(bytes.path(), what))?;
         let placement = match corner_transform(bytes, ifd)? {
             // Coordinates of a place are those of a sample's corner in an area, of its centre for points.
             Some([origin, step]) => Some(Placement {
-                origin: if keys.pixel_is_point() { origin } else { [0, 1].map(|i| origin[i] + 0.5 * step[i]) },
+                origin: if keys.pixel_is_point() {
+                    origin
+                } else {
+                    [0, 1].map(|i| origin[i] + 0.5 * step[i])
+                },
                 step,
             }),
             None => world_file::find(bytes.path())?,
         };
-        Ok(Self { placement, crs, vertical_unit: keys.vertical_unit() })
+        Ok(Self {
+            placement,
+            crs,
+            vertical_unit: keys.vertical_unit(),
+        })
     }
 }
 
@@ -45,14 +55,20 @@ fn corner_transform(bytes: &Bytes, ifd: &Ifd) -> Result<Option<[[f64; 2]; 2]>, D
         (Some([x, y, ..]), Some([column, row, _, tie_x, tie_y, ..])) => {
             // The scale counts rows downward.
             let step = [*x, -*y];
-            Ok(Some([[tie_x - column * step[0], tie_y - row * step[1]], step]))
+            Ok(Some([
+                [tie_x - column * step[0], tie_y - row * step[1]],
+                step,
+            ]))
         }
-        (Some(_), _) => {
-            Err(DemError::format(bytes.path(), "tag 33550 (pixel scale) without a tie point in tag 33922"))
-        }
+        (Some(_), _) => Err(DemError::format(
+            bytes.path(),
+            "tag 33550 (pixel scale) without a tie point in tag 33922",
+        )),
         (None, Some(ties)) if ties.len() > 6 => {
             let count = ties.len() / 6;
-            let what = format!("{count} ground control points (tag 33922) in place of a transform; warp it first");
+            let what = format!(
+                "{count} ground control points (tag 33922) in place of a transform; warp it first"
+            );
             Err(DemError::unsupported(bytes.path(), what))
         }
         _ => Ok(None),
@@ -61,7 +77,10 @@ fn corner_transform(bytes: &Bytes, ifd: &Ifd) -> Result<Option<[[f64; 2]; 2]>, D
 
 fn from_matrix(bytes: &Bytes, matrix: &[f64]) -> Result<[[f64; 2]; 2], DemError> {
     let [a, b, _, x, c, d, _, y, ..] = matrix else {
-        let what = format!("tag 34264 (transformation) has {} numbers, not 16", matrix.len());
+        let what = format!(
+            "tag 34264 (transformation) has {} numbers, not 16",
+            matrix.len()
+        );
         return Err(DemError::format(bytes.path(), what));
     };
     // A ten thousandth of a step over 100,000 samples: noise of arithmetic, no rotation.

@@ -17,7 +17,9 @@ impl BandMetadata {
     pub(super) fn parse(text: &str) -> Self {
         let mut found = Self::default();
         for item in text.split("<Item ").skip(1) {
-            let Some((attributes, rest)) = item.split_once('>') else { continue };
+            let Some((attributes, rest)) = item.split_once('>') else {
+                continue;
+            };
             let value = rest.split('<').next().unwrap_or("").trim();
             if attribute(attributes, "sample").is_some_and(|sample| sample != "0") {
                 continue;
@@ -45,7 +47,12 @@ fn attribute<'a>(attributes: &'a str, name: &str) -> Option<&'a str> {
 
 /// The void mark, as GDAL writes it: a number, `nan`, `inf` or `-inf`.
 pub(super) fn nodata(text: &str) -> Option<f64> {
-    text.trim().to_lowercase().replace("1.#qnan", "nan").replace("1.#inf", "inf").parse().ok()
+    text.trim()
+        .to_lowercase()
+        .replace("1.#qnan", "nan")
+        .replace("1.#inf", "inf")
+        .parse()
+        .ok()
 }
 
 #[cfg(test)]
@@ -59,8 +66,18 @@ mod tests {
             <Item name=\"SCALE\" sample=\"1\" role=\"scale\">7</Item>\n\
             <Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">ft</Item></GDALMetadata>";
         let found = BandMetadata::parse(text);
-        assert_eq!(found, BandMetadata { scale: Some(0.1), offset: Some(-1000.0), unit: Some(units::FOOT) });
-        assert_eq!(BandMetadata::parse("no metadata <Item "), BandMetadata::default());
+        assert_eq!(
+            found,
+            BandMetadata {
+                scale: Some(0.1),
+                offset: Some(-1000.0),
+                unit: Some(units::FOOT)
+            }
+        );
+        assert_eq!(
+            BandMetadata::parse("no metadata <Item "),
+            BandMetadata::default()
+        );
     }
 
     #[test]

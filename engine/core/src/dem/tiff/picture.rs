@@ -25,25 +25,42 @@ enum Colors {
 }
 
 /// Width, height and pixels in stored order.
-pub(in super::super) fn read_picture(bytes: &Bytes, ifd: &Ifd) -> Result<(u32, u32, Vec<[u8; 3]>), DemError> {
+pub(in super::super) fn read_picture(
+    bytes: &Bytes,
+    ifd: &Ifd,
+) -> Result<(u32, u32, Vec<[u8; 3]>), DemError> {
     let bands = ifd.short(bytes, tag::SAMPLES, 1)?;
     let colors = read_colors(bytes, ifd, bands)?;
     let apart = bands > 1 && ifd.short(bytes, tag::PLANAR, 1)? == 2;
     let coding = Coding::read(bytes, ifd, if apart { 1 } else { bands })?;
     let jpeg = coding.compression == JPEG;
     let unsupported = if jpeg { None } else { coding.unsupported() };
-    let odd = || (coding.format != 1 || !matches!(coding.bits, 8 | 16)).then(|| "an image of other than 8 or 16 bits");
-    if let Some(what) = unsupported.or_else(|| odd().map(Into::into)) {
+    if let Some(what) = unsupported {
         return Err(DemError::unsupported(bytes.path(), what));
     }
+    if coding.format != 1 || !matches!(coding.bits, 8 | 16) {
+        return Err(DemError::unsupported(
+            bytes.path(),
+            "an image of other than 8 or 16 bits, unsigned",
+        ));
+    }
     if jpeg && (apart || coding.bits != 8 || !matches!(bands, 1 | 3)) {
-        return Err(DemError::unsupported(bytes.path(), "JPEG compression of other than grey or YCbCr"));
+        return Err(DemError::unsupported(
+            bytes.path(),
+            "JPEG compression of other than grey or YCbCr",
+        ));
     }
     let table = Table::read(bytes, ifd, &coding, if apart { bands } else { 1 })?;
     check_size(bytes, table.width.into(), table.height.into())?;
     let mut picture = vec![[0; 3]; table.width as usize * table.height as usize];
     let tables = ifd.raw(bytes, tag::JPEG_TABLES)?;
-    let source = Source { bytes, coding, table: &table, colors, apart };
+    let source = Source {
+        bytes,
+        coding,
+        table: &table,
+        colors,
+        apart,
+    };
     for index in 0..table.plane_len() {
         if jpeg {
             source.copy_jpeg(index, tables.as_deref(), &mut picture)?;
@@ -66,7 +83,9 @@ fn read_colors(bytes: &Bytes, ifd: &Ifd, bands: u16) -> Result<Colors, DemError>
         (6, 3) if jpeg => Ok(Colors::Rgb),
         (3, 1) => read_palette(bytes, ifd).map(Colors::Palette),
         _ => {
-            let what = format!("an image of {bands} bands and photometric interpretation {photometric} (tag 262)");
+            let what = format!(
+                "an image of {bands} bands and photometric interpretation {photometric} (tag 262)"
+            );
             Err(DemError::unsupported(bytes.path(), what))
         }
     }
@@ -77,10 +96,15 @@ fn read_palette(bytes: &Bytes, ifd: &Ifd) -> Result<Vec<[u8; 3]>, DemError> {
     let values = ifd.numbers(bytes, tag::PALETTE)?.unwrap_or_default();
     let count = values.len() / 3;
     if count == 0 {
-        return Err(DemError::format(bytes.path(), "palette colours without a palette (tag 320)"));
+        return Err(DemError::format(
+            bytes.path(),
+            "palette colours without a palette (tag 320)",
+        ));
     }
     let level = |value: u64| u16::try_from(value).map_or(u8::MAX, to_8_bits);
-    Ok((0..count).map(|index| [0, 1, 2].map(|band| level(values[band * count + index]))).collect())
+    Ok((0..count)
+        .map(|index| [0, 1, 2].map(|band| level(values[band * count + index])))
+        .collect())
 }
 
 /// An open image.
@@ -104,7 +128,10 @@ impl Source<'_> {
     fn place(&self, index: usize) -> Place {
         let table = self.table;
         let across = table.across() as usize;
-        let (row, column) = (index / across * table.chunk_rows as usize, index % across * table.chunk_columns as usize);
+        let (row, column) = (
+            index / across * table.chunk_rows as usize,
+            index % across * table.chunk_columns as usize,
+        );
         Place {
             row,
             column,
@@ -130,7 +157,9 @@ impl Source<'_> {
         for plane in 0..plane_count {
             let index = plane * self.table.plane_len() + index;
             // A part that the file leaves out stays black.
-            let Some(place) = self.table.place(index) else { return Ok(()) };
+            let Some(place) = self.table.place(index) else {
+                return Ok(());
+            };
             planes.push(self.table.decode(self.bytes, &self.coding, index, place)?);
         }
         let columns = self.table.chunk_columns as usize;
@@ -143,15 +172,23 @@ impl Source<'_> {
             Colors::Grey => [band(row, column, 0).0; 3],
             Colors::InverseGrey => [!band(row, column, 0).0; 3],
             Colors::Rgb => [0, 1, 2].map(|b| band(row, column, b).0),
-            Colors::Palette(palette) => {
-                palette.get(usize::from(band(row, column, 0).1)).copied().unwrap_or_default()
-            }
+            Colors::Palette(palette) => palette
+                .get(usize::from(band(row, column, 0).1))
+                .copied()
+                .unwrap_or_default(),
         });
         Ok(())
     }
 
-    fn copy_jpeg(&self, index: usize, tables: Option<&[u8]>, picture: &mut [[u8; 3]]) -> Result<(), DemError> {
-        let Some(place) = self.table.place(index) else { return Ok(()) };
+    fn copy_jpeg(
+        &self,
+        index: usize,
+        tables: Option<&[u8]>,
+        picture: &mut [[u8; 3]],
+    ) -> Result<(), DemError> {
+        let Some(place) = self.table.place(index) else {
+            return Ok(());
+        };
         let stored = self.table.stored(self.bytes, &self.coding, index, place)?;
         let damaged = |what: &str| self.table.damaged(self.bytes, index, what);
         let (wanted, columns) = (self.place(index), self.table.chunk_columns as usize);
@@ -160,17 +197,26 @@ impl Source<'_> {
             Some([tables @ .., _, _]) => [tables, stored.get(2..).unwrap_or_default()].concat(),
             _ => stored,
         };
-        let decoder = JpegDecoder::new(Cursor::new(file)).map_err(|error| damaged(&error.to_string()))?;
+        let decoder =
+            JpegDecoder::new(Cursor::new(file)).map_err(|error| damaged(&error.to_string()))?;
         let (width, height) = decoder.dimensions();
-        if width as usize != columns || (height as usize) < wanted.rows || height > self.table.chunk_rows {
+        if width as usize != columns
+            || (height as usize) < wanted.rows
+            || height > self.table.chunk_rows
+        {
             return Err(damaged(&format!("a JPEG of {width} x {height} pixels")));
         }
-        let decoded = DynamicImage::from_decoder(decoder).map_err(|error| damaged(&error.to_string()))?;
+        let decoded =
+            DynamicImage::from_decoder(decoder).map_err(|error| damaged(&error.to_string()))?;
         let pixels = decoded.into_rgb8();
         let inverse = matches!(self.colors, Colors::InverseGrey);
         self.put(index, picture, |row, column| {
             let pixel = pixels.as_raw().as_chunks::<3>().0[row * columns + column];
-            if inverse { pixel.map(|level| !level) } else { pixel }
+            if inverse {
+                pixel.map(|level| !level)
+            } else {
+                pixel
+            }
         });
         Ok(())
     }

@@ -30,23 +30,60 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// Reads the tables (of `planes` bands that lie apart, or 1) and checks that every chunk lies in the file and may be as large as it says.
-    pub(super) fn read(bytes: &Bytes, ifd: &Ifd, coding: &Coding, planes: u16) -> Result<Self, DemError> {
+    /// Reads the tables (of `planes` bands that lie apart, or 1) and checks that every chunk lies in the file and may
+    /// be as large as it says.
+    pub(super) fn read(
+        bytes: &Bytes,
+        ifd: &Ifd,
+        coding: &Coding,
+        planes: u16,
+    ) -> Result<Self, DemError> {
+        Self::read_any(bytes, ifd, coding, planes, 1)
+    }
+
+    /// The same for one bit a sample; widths are then bytes.
+    pub(super) fn read_packed(bytes: &Bytes, ifd: &Ifd, coding: &Coding) -> Result<Self, DemError> {
+        Self::read_any(bytes, ifd, coding, 1, 8)
+    }
+
+    fn read_any(
+        bytes: &Bytes,
+        ifd: &Ifd,
+        coding: &Coding,
+        planes: u16,
+        samples_a_byte: u32,
+    ) -> Result<Self, DemError> {
         let [width, height] = [tag::WIDTH, tag::HEIGHT].map(|tag| require(bytes, ifd, tag));
-        let (width, height) = (width?, height?);
+        let (width, height) = (width?.div_ceil(samples_a_byte), height?);
         let tiled = ifd.has(tag::TILE_OFFSETS);
         let (chunk_columns, chunk_rows) = if tiled {
-            (require(bytes, ifd, tag::TILE_WIDTH)?, require(bytes, ifd, tag::TILE_HEIGHT)?)
+            (
+                require(bytes, ifd, tag::TILE_WIDTH)?.div_ceil(samples_a_byte),
+                require(bytes, ifd, tag::TILE_HEIGHT)?,
+            )
         } else {
-            let rows = ifd.number(bytes, tag::ROWS_PER_STRIP)?.unwrap_or(height.into());
+            let rows = ifd
+                .number(bytes, tag::ROWS_PER_STRIP)?
+                .unwrap_or(height.into());
             (width, u32::try_from(rows).unwrap_or(u32::MAX).min(height))
         };
         if [width, height, chunk_columns, chunk_rows].contains(&0) {
-            let what = format!("{width} x {height} samples in parts of {chunk_columns} x {chunk_rows} are none");
+            let what = format!(
+                "{width} x {height} samples in parts of {chunk_columns} x {chunk_rows} are none"
+            );
             return Err(DemError::format(bytes.path(), what));
         }
         let name = if tiled { "tile" } else { "strip" };
-        let mut table = Self { width, height, chunk_columns, chunk_rows, name, tiled, planes, places: Vec::new() };
+        let mut table = Self {
+            width,
+            height,
+            chunk_columns,
+            chunk_rows,
+            name,
+            tiled,
+            planes,
+            places: Vec::new(),
+        };
         table.places = table.read_places(bytes, ifd, coding)?;
         table.split_plain_strips(coding);
         table.check(bytes, coding)?;
@@ -69,7 +106,10 @@ impl Table {
 
     /// First byte and number of bytes of a chunk; none when the file leaves it out.
     pub(super) fn place(&self, index: usize) -> Option<(u64, u64)> {
-        self.places.get(index).copied().filter(|&(_, count)| count > 0)
+        self.places
+            .get(index)
+            .copied()
+            .filter(|&(_, count)| count > 0)
     }
 
     /// Rows that a chunk stores: a tile's are whole, the last strip's are not.
@@ -77,17 +117,34 @@ impl Table {
         let row = index % self.plane_len() / self.across() as usize;
         let first = row as u64 * u64::from(self.chunk_rows);
         let left = u64::from(self.height).saturating_sub(first);
-        if self.tiled { self.chunk_rows } else { u32::try_from(left).unwrap_or(u32::MAX).min(self.chunk_rows) }
+        if self.tiled {
+            self.chunk_rows
+        } else {
+            u32::try_from(left).unwrap_or(u32::MAX).min(self.chunk_rows)
+        }
     }
 
-    fn read_places(&self, bytes: &Bytes, ifd: &Ifd, coding: &Coding) -> Result<Vec<(u64, u64)>, DemError> {
-        let tags = if self.tiled { [tag::TILE_OFFSETS, tag::TILE_BYTES] } else { [tag::STRIP_OFFSETS, tag::STRIP_BYTES] };
+    fn read_places(
+        &self,
+        bytes: &Bytes,
+        ifd: &Ifd,
+        coding: &Coding,
+    ) -> Result<Vec<(u64, u64)>, DemError> {
+        let tags = if self.tiled {
+            [tag::TILE_OFFSETS, tag::TILE_BYTES]
+        } else {
+            [tag::STRIP_OFFSETS, tag::STRIP_BYTES]
+        };
         let wanted = u64::from(self.across()) * u64::from(self.down()) * u64::from(self.planes);
-        let offsets = ifd.table(bytes, tags[0], MAX_TABLE_BYTES)?.ok_or_else(|| missing(bytes, tags[0]))?;
+        let offsets = ifd
+            .table(bytes, tags[0], MAX_TABLE_BYTES)?
+            .ok_or_else(|| missing(bytes, tags[0]))?;
         let counts = match ifd.table(bytes, tags[1], MAX_TABLE_BYTES)? {
             Some(counts) => counts,
             // Old writers left it out where it can be computed.
-            None if coding.is_plain() && !self.tiled => (0..offsets.len()).map(|i| self.plain_bytes(i, coding)).collect(),
+            None if coding.is_plain() && !self.tiled => (0..offsets.len())
+                .map(|i| self.plain_bytes(i, coding))
+                .collect(),
             None => return Err(missing(bytes, tags[1])),
         };
         for (tag, len) in tags.into_iter().zip([offsets.len(), counts.len()]) {
@@ -115,13 +172,19 @@ impl Table {
     fn split_plain_strips(&mut self, coding: &Coding) {
         let most = (PLAIN_PART_BYTES / self.row_bytes(coding)).max(1);
         let most = u32::try_from(most).unwrap_or(u32::MAX);
-        let is_enough = |(index, &(_, count)): (usize, &(u64, u64))| count >= self.plain_bytes(index, coding);
+        let is_enough =
+            |(index, &(_, count)): (usize, &(u64, u64))| count >= self.plain_bytes(index, coding);
         let splittable = !self.tiled && self.planes == 1 && coding.is_plain();
-        if !splittable || self.chunk_rows <= most || !self.places.iter().enumerate().all(is_enough) {
+        if !splittable || self.chunk_rows <= most || !self.places.iter().enumerate().all(is_enough)
+        {
             return;
         }
         // All parts but the last of all must be equal.
-        let rows = if self.places.len() == 1 { most } else { largest_divisor(self.chunk_rows, most) };
+        let rows = if self.places.len() == 1 {
+            most
+        } else {
+            largest_divisor(self.chunk_rows, most)
+        };
         let part_bytes = u64::from(rows) * self.row_bytes(coding);
         let mut parts = Vec::new();
         for (index, &(offset, _)) in self.places.iter().enumerate() {
@@ -172,11 +235,22 @@ impl Table {
     fn check(&self, bytes: &Bytes, coding: &Coding) -> Result<(), DemError> {
         let sample_count = u64::from(self.chunk_columns) * u64::from(self.chunk_rows);
         if sample_count.saturating_mul(coding.bytes()) > MAX_CHUNK_BYTES {
-            let what = format!("a {} of {} x {} samples", self.name, self.chunk_columns, self.chunk_rows);
-            return Err(DemError::limit(bytes.path(), what, format!("{MAX_CHUNK_BYTES} bytes")));
+            let what = format!(
+                "a {} of {} x {} samples",
+                self.name, self.chunk_columns, self.chunk_rows
+            );
+            return Err(DemError::limit(
+                bytes.path(),
+                what,
+                format!("{MAX_CHUNK_BYTES} bytes"),
+            ));
         }
         for (index, &(offset, count)) in self.places.iter().enumerate() {
-            if count > 0 && offset.checked_add(count).is_none_or(|end| end > bytes.len()) {
+            if count > 0
+                && offset
+                    .checked_add(count)
+                    .is_none_or(|end| end > bytes.len())
+            {
                 let what = format!(
                     "truncated: {} {index} takes {count} bytes at byte {offset}, the file ends at byte {}",
                     self.name,
@@ -191,7 +265,8 @@ impl Table {
 
 fn require(bytes: &Bytes, ifd: &Ifd, tag: u16) -> Result<u32, DemError> {
     let value = ifd.number(bytes, tag)?.ok_or_else(|| missing(bytes, tag))?;
-    u32::try_from(value).map_err(|_| DemError::limit(bytes.path(), format!("{value} in tag {tag}"), "32 bits"))
+    u32::try_from(value)
+        .map_err(|_| DemError::limit(bytes.path(), format!("{value} in tag {tag}"), "32 bits"))
 }
 
 fn missing(bytes: &Bytes, tag: u16) -> DemError {
@@ -199,5 +274,8 @@ fn missing(bytes: &Bytes, tag: u16) -> DemError {
 }
 
 fn largest_divisor(number: u32, most: u32) -> u32 {
-    (1..=most).rev().find(|part| number.is_multiple_of(*part)).unwrap_or(1)
+    (1..=most)
+        .rev()
+        .find(|part| number.is_multiple_of(*part))
+        .unwrap_or(1)
 }

@@ -6,10 +6,10 @@ use super::levels::Levels;
 use super::measure::{Finest, TileErrors, measure};
 use super::options::{Stage, Watch};
 use crate::geo::{Grid, TileId};
-use crate::pyramid::surface::{child_window, encode_detail};
+use crate::pyramid::surface::{child_window, encode_detail, encode_key_controls};
 use crate::pyramid::{
-    PyramidError, PyramidWriter, RecordLayout, RecordParts, ShardInfo, Summary, patch_nibble,
-    shard_count,
+    NEVER, PyramidError, PyramidWriter, RecordLayout, RecordParts, ShardInfo, Summary,
+    patch_nibble, shard_count,
 };
 
 /// What was measured of a tile.
@@ -106,7 +106,8 @@ fn measure_tile(
     let errors = measure(&heights, first, grid.stride(tile.level) as usize, &finest);
     let voids = samples.tile_voids(place).map_or(0, |(_, count)| count);
     let summary = summarise(&heights, voids, ceil_f32(errors.whole * unit), children);
-    let patch_codes = patch_codes(&errors, summary.error, unit);
+    let base = summary.error.max(ceil_f32(unit));
+    let patch_codes = patch_codes(&errors, tile, grid, base, unit);
     Measured {
         summary,
         patch_codes,
@@ -140,9 +141,17 @@ fn summarise(heights: &[i32], voids: usize, error: f32, children: &[Summary; 4])
     summary
 }
 
-fn patch_codes(errors: &TileErrors, tile_error: f32, unit: f64) -> Vec<u8> {
-    let base = tile_error.max(ceil_f32(unit));
-    let nibble = |error: f64| patch_nibble(error * unit, base);
+/// A finest tile stores no patch errors: there they equal the stride errors of its own heights, which every reader
+/// computes and takes the lesser of, exactly and without a byte.
+fn patch_codes(errors: &TileErrors, tile: TileId, grid: &Grid, base: f32, unit: f64) -> Vec<u8> {
+    let finest = tile.level + 1 == grid.level_count();
+    let nibble = |error: f64| {
+        if finest {
+            NEVER
+        } else {
+            patch_nibble(error * unit, base)
+        }
+    };
     errors
         .patches
         .iter()
@@ -165,7 +174,7 @@ pub(super) fn record(
     let measured = &measures[index][index_of(grid, tile)];
     let voids = levels.samples[index].tile_voids(place);
     let cage = match tile.parent().filter(|_| !level.key) {
-        None => controls,
+        None => encode_key_controls(&controls, level.step),
         Some(parent) => {
             let above = levels.cages[usize::from(parent.level)].tile([parent.row, parent.column]);
             let predicted = child_window(&above, tile.quadrant());
