@@ -1,3 +1,5 @@
 //! End-to-end tests, one binary.
 
+mod commands;
 mod layers;
+mod support;
