@@ -1,5 +1,6 @@
 //! End-to-end tests, one binary.
 
 mod commands;
+mod flight;
 mod layers;
 mod support;
