@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use drumlin_core::{
-    dem::{self, Raster},
+    dem,
     geo::Grid,
 };
 use serde_json::{Value, json};
