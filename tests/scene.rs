@@ -181,7 +181,9 @@ pub fn frame(camera: &Camera, drawn: usize) -> Frame {
         flags: 0,
         height_range: [-50.0, 430.0],
         camera_height: eye.z as f32,
-        color_fade: 0.0,
+        reserved: 0.0,
+        ground_min: [f32::MIN; 2],
+        ground_max: [f32::MAX; 2],
     }
 }
 
@@ -200,6 +202,7 @@ pub fn plan(camera: &Camera, cut: &[TileId]) -> FramePlan {
         frame: Some(frame(camera, cut.len())),
         drawn: drawn_tiles(camera, cut, &resident),
         places: Vec::new(),
+        ground: [[f64::MIN; 2], [f64::MAX; 2]],
     }
 }
 

@@ -57,7 +57,7 @@ macro_rules! fields {
 #[test]
 fn structs_have_one_layout_on_both_sides() {
     let frame = fields!(Frame: clip_from_view_world, viewport, pixels_per_radian, tolerance, unit, drawn_count,
-        index_capacity, uniform_depth, sun, haze, sky, flags, height_range, camera_height, color_fade);
+        index_capacity, uniform_depth, sun, haze, sky, flags, height_range, camera_height, reserved, ground_min, ground_max);
     let tile = fields!(DrawnTile: origin, slot, step, error, level, base, z_min, z_max, flags, parent_slot, quadrant,
         color_slot, color_scale, color_offset, skirt, geometric_error, corner_tile, corner_sample, side_north,
         side_east, side_south, side_west);

@@ -15,7 +15,9 @@ struct Frame {
     flags: u32,                     // see FLAG_*
     height_range: vec2f,            // metres, of the whole data set
     camera_height: f32,             // metres: world z of the camera
-    color_fade: f32,                // reserved, 0
+    reserved: f32,                  // 0
+    ground_min: vec2f,              // camera-relative metres: the data set's box, which tiles reach past
+    ground_max: vec2f,
 }
 
 const FLAG_DRAW_VOIDS: u32 = 1u;    // void triangles are drawn with their filled heights

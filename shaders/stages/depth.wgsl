@@ -45,7 +45,18 @@ fn patch_error(tile: u32, patch_index: u32, depth: u32, tolerance: f32) -> f32 {
     return min(bound, tiles[tile].geometric_error + stride_error);
 }
 
+// True for a patch past the data set: nothing of it is seen.
+fn is_outside(tile: u32, patch_index: u32) -> bool {
+    let cell = vec2f(vec2u(patch_index % TILE_QUADS, patch_index / TILE_QUADS) * QUAD_SAMPLES);
+    let near = tiles[tile].origin.xy + cell * tiles[tile].step;
+    let far = near + f32(QUAD_SAMPLES) * tiles[tile].step;
+    return any(max(near, far) < frame.ground_min) || any(min(near, far) > frame.ground_max);
+}
+
 fn patch_depth(tile: u32, patch_index: u32) -> u32 {
+    if is_outside(tile, patch_index) {
+        return 0u;
+    }
     if frame.uniform_depth != NONE {
         return min(frame.uniform_depth, FINEST_DEPTH);
     }

@@ -113,9 +113,17 @@ fn ground_color(here: Place, height: f32) -> vec3f {
     return lit(natural_color(share, normal), normal, frame.sun);
 }
 
+// Tiles reach past the data set; nothing is drawn there.
+fn is_outside(at: vec2f) -> bool {
+    return any(at < frame.ground_min) || any(at > frame.ground_max);
+}
+
 @fragment
 fn color(in: Vertex) -> @location(0) vec4f {
     let per_pixel_metres = max(fwidth(in.position.xy), vec2f(1.0e-9));
+    if is_outside(in.position.xy) {
+        discard;
+    }
     let here = locate(in.tile, in.position.xy);
     var result = ground_color(here, in.position.z + frame.camera_height);
     if (frame.flags & FLAG_WIREFRAME) != 0u {
@@ -132,5 +140,8 @@ fn color(in: Vertex) -> @location(0) vec4f {
 // Metres along the view axis: clip.w of a perspective matrix whose w is the distance.
 @fragment
 fn depth_image(in: Vertex) -> @location(0) f32 {
+    if is_outside(in.position.xy) {
+        discard;
+    }
     return in.view_depth;
 }

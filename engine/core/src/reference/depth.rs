@@ -66,7 +66,24 @@ fn patch_error(tile: &DrawnTile, pages: &Pages<'_>, patch: u32, depth: u32, tole
     bound.min(tile.geometric_error + stride_error)
 }
 
+/// True for a patch past the data set: nothing of it is seen.
+fn is_outside(frame: &Frame, tile: &DrawnTile, patch: u32) -> bool {
+    let cell = [
+        patch % TILE_QUADS * QUAD_SAMPLES,
+        patch / TILE_QUADS * QUAD_SAMPLES,
+    ];
+    let step = Vec2::from(tile.step);
+    let near = Vec2::new(tile.origin[0], tile.origin[1])
+        + Vec2::new(cell[0] as f32, cell[1] as f32) * step;
+    let far = near + QUAD_SAMPLES as f32 * step;
+    let (low, high) = (Vec2::from(frame.ground_min), Vec2::from(frame.ground_max));
+    near.max(far).cmplt(low).any() || near.min(far).cmpgt(high).any()
+}
+
 fn patch_depth(frame: &Frame, tile: &DrawnTile, pages: &Pages<'_>, patch: u32) -> u32 {
+    if is_outside(frame, tile, patch) {
+        return 0;
+    }
     if frame.uniform_depth != NONE {
         return frame.uniform_depth.min(FINEST_DEPTH);
     }

@@ -114,8 +114,12 @@ pub struct Frame {
     pub height_range: [f32; 2],
     /// World z of the camera, metres.
     pub camera_height: f32,
-    /// Reserved, 0.
-    pub color_fade: f32,
+    /// 0.
+    pub reserved: f32,
+    /// South-west corner of the data set, which tiles reach past, camera-relative metres.
+    pub ground_min: [f32; 2],
+    /// North-east corner of the data set, camera-relative metres.
+    pub ground_max: [f32; 2],
 }
 
 /// A drawn tile, and how its neighbours lie.

@@ -16,6 +16,7 @@ pub(super) struct FrameBase {
     height_range: [f32; 2],
     index_capacity: u32,
     uniform_depth: u32,
+    ground: [[f64; 2]; 2],
 }
 
 impl FrameBase {
@@ -32,7 +33,13 @@ impl FrameBase {
                 .map(|height| (f64::from(height) * unit) as f32),
             index_capacity: pool.index_capacity,
             uniform_depth: uniform_depth.unwrap_or(NONE),
+            ground: ground(metadata),
         }
+    }
+
+    /// South-west and north-east corner of the data set in world metres.
+    pub(super) fn ground(&self) -> [[f64; 2]; 2] {
+        self.ground
     }
 
     /// A frame of a view, lit from the north-west as maps are, without haze: looks are the caller's.
@@ -55,23 +62,33 @@ impl FrameBase {
             flags: 0,
             height_range: self.height_range,
             camera_height: 0.0,
-            color_fade: 0.0,
+            reserved: 0.0,
+            ground_min: [0.0; 2],
+            ground_max: [0.0; 2],
         };
-        point(&mut frame, view);
+        point(&mut frame, view, self.ground);
         frame
     }
 }
 
-/// Sets all that depends on the camera.
+/// South-west and north-east corner of the data set in world metres.
+fn ground(metadata: &Metadata) -> [[f64; 2]; 2] {
+    let (extent, frame) = (metadata.grid.extent(), metadata.frame());
+    [extent.min, extent.max].map(|corner| frame.to_world(corner))
+}
+
+/// Sets all that depends on the camera; `ground` is the data set's box in world metres.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "pixels and metres are f32 on the GPU"
 )]
-pub(super) fn point(frame: &mut Frame, view: &View) {
+pub(super) fn point(frame: &mut Frame, view: &View, ground: [[f64; 2]; 2]) {
     frame.clip_from_view_world = clip_from_view_world(view);
     frame.viewport = [view.width as f32, view.height as f32];
     frame.pixels_per_radian = view.pixels_per_radian() as f32;
     frame.camera_height = view.eye[2] as f32;
+    let relative = |corner: [f64; 2]| [0, 1].map(|axis| (corner[axis] - view.eye[axis]) as f32);
+    [frame.ground_min, frame.ground_max] = ground.map(relative);
 }
 
 /// Camera-relative world metres to clip space: depth 1 at the near plane, 0 at infinity.

@@ -54,6 +54,8 @@ pub struct FramePlan {
     pub drawn: Vec<DrawnTile>,
     /// Where each drawn tile is.
     pub places: Vec<Place>,
+    /// South-west and north-east corner of the data set in world metres; tiles reach past it, what is drawn does not.
+    pub ground: [[f64; 2]; 2],
 }
 
 impl FramePlan {
@@ -75,7 +77,7 @@ impl FramePlan {
             }
         }
         if let Some(frame) = &mut self.frame {
-            point(frame, view);
+            point(frame, view, self.ground);
         }
     }
 

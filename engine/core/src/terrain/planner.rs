@@ -193,6 +193,7 @@ impl Planner {
         let uploaded_bytes = self.upload(plan);
         self.drawn.find(&mut self.tree);
         list::fill(plan, &self.tree, &self.drawn, self.source.0.metadata());
+        plan.ground = self.base.ground();
         plan.frame = Some(self.base.frame(view, rule.tolerance, plan.drawn.len()));
         plan.aim(view);
         let mut stats = FrameStats {

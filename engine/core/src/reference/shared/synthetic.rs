@@ -106,7 +106,9 @@ pub fn frame(drawn_count: u32) -> Frame {
         flags: 0,
         height_range: [0.0, 1000.0],
         camera_height: 0.0,
-        color_fade: 0.0,
+        reserved: 0.0,
+        ground_min: [f32::MIN; 2],
+        ground_max: [f32::MAX; 2],
     }
 }
 
