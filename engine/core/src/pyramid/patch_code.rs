@@ -9,7 +9,7 @@ pub const NEVER: u8 = 15;
 /// 2^(n/2), the odd ones rounded to the nearest f32; kernels and references multiply by the same numbers.
 pub const HALF_OCTAVES: [f32; 15] = [
     1.0,
-    1.414_213_5,
+    std::f32::consts::SQRT_2,
     2.0,
     2.828_427,
     4.0,

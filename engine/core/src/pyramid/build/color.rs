@@ -330,6 +330,7 @@ fn encode(light: f32) -> u8 {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_possible_truncation, reason = "test pictures wrap")]
 mod tests {
     use super::*;
     use crate::geo::Crs;

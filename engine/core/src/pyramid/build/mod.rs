@@ -21,6 +21,7 @@ mod scale;
 #[cfg(test)]
 pub(crate) mod testing;
 #[cfg(test)]
+#[expect(clippy::cast_possible_truncation, reason = "small numbers")]
 mod tests;
 mod voids;
 
