@@ -6,6 +6,7 @@
 //! ```
 
 mod descriptor;
+pub mod feature_mesh;
 mod frame;
 mod frame_plan;
 mod list;
