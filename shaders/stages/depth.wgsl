@@ -46,6 +46,9 @@ fn patch_error(tile: u32, patch_index: u32, depth: u32, tolerance: f32) -> f32 {
 }
 
 fn patch_depth(tile: u32, patch_index: u32) -> u32 {
+    if (tiles[tile].flags & TILE_CUT) != 0u && pool_cut(tiles[tile].slot, patch_index) {
+        return FINEST_DEPTH | DEPTH_CUT;
+    }
     if frame.uniform_depth != NONE {
         return min(frame.uniform_depth, FINEST_DEPTH);
     }

@@ -2,17 +2,20 @@
 //!
 //! `FORMAT.md` beside this crate draws every byte. Knows files and numbers; knows no camera and no screen.
 
+pub mod build;
 mod error;
 mod files;
 mod metadata;
+mod patch_code;
 mod query;
 mod reader;
 mod record;
 #[cfg(test)]
-pub(crate) mod sample;
+mod sample;
 mod shard;
 mod store;
 pub mod surface;
+pub mod templates;
 mod tile;
 mod validate;
 mod writer;
@@ -22,6 +25,7 @@ mod zarr_python;
 
 pub use error::PyramidError;
 pub use metadata::{ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};
+pub use patch_code::{HALF_OCTAVES, NEVER, patch_error, patch_nibble};
 pub use query::Heights;
 pub use reader::Pyramid;
 pub use record::{Record, RecordLayout, RecordParts, VOID_BYTES, number_bytes};

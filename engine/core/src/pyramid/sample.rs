@@ -146,7 +146,11 @@ fn records(metadata: &Metadata) -> HashMap<TileId, Vec<u8>> {
         });
         let level = &metadata.levels[usize::from(tile.level)];
         let (stored, decoded) = match tile.parent().filter(|_| !level.key) {
-            None => (wanted.clone(), wanted),
+            None => {
+                let codes = surface::encode_key_controls(&wanted, level.step);
+                let decoded = surface::decode_key_controls(&codes, level.step);
+                (codes, decoded)
+            }
             Some(parent) => {
                 let parent: &Vec<i32> = &controls[&parent];
                 let codes = surface::encode_controls(&wanted, parent, tile.quadrant(), level.step);

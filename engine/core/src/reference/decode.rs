@@ -7,8 +7,8 @@
 //! Based on: `FORMAT.md`, the rule of the regular tile; cubic B-splines.
 
 use super::shared::{
-    CODES_WORD, CONTROLS_WORD, HEIGHTS_WORD, SLOPES_WORD, SLOT_WORDS, STRIDE_ERRORS_WORD,
-    UPLOAD_CODES_WORD, UPLOAD_CONTROLS_WORD, UPLOAD_DETAIL_WORD, UPLOAD_VOIDS_WORD, UPLOAD_WORDS,
+    CODES_WORD, CONTROLS_WORD, CUT_WORD, HEIGHTS_WORD, SLOPES_WORD, SLOT_WORDS, STRIDE_ERRORS_WORD,
+    UPLOAD_CODES_WORD, UPLOAD_CONTROLS_WORD, UPLOAD_CUT_WORD, UPLOAD_DETAIL_WORD, UPLOAD_VOIDS_WORD, UPLOAD_WORDS,
     UploadHeader, VOIDS_WORD, pool::pack_2x16_float,
 };
 use crate::{
@@ -50,7 +50,10 @@ pub fn stage_tile(tile: &Tile, words: &mut [u32]) {
     if let Some(voids) = &tile.voids {
         put_bytes(&mut words[UPLOAD_VOIDS_WORD..UPLOAD_CODES_WORD], voids);
     }
-    put_bytes(&mut words[UPLOAD_CODES_WORD..], &tile.patch_codes);
+    put_bytes(
+        &mut words[UPLOAD_CODES_WORD..UPLOAD_CUT_WORD],
+        &tile.patch_codes,
+    );
 }
 
 fn put_bytes(words: &mut [u32], bytes: &[u8]) {
@@ -88,9 +91,9 @@ pub(super) fn base_height(upload: &[u32], row: usize, column: usize) -> i32 {
     let row_weights = LIMIT_WEIGHTS[row % QUAD_SAMPLES];
     let column_weights = LIMIT_WEIGHTS[column % QUAD_SAMPLES];
     let (mut high, mut low) = (0, 0);
-    for (i, row_weight) in row_weights.iter().enumerate() {
-        for (j, column_weight) in column_weights.iter().enumerate() {
-            let weight = row_weight * column_weight;
+    for i in 0..4 {
+        for j in 0..4 {
+            let weight = row_weights[i] * column_weights[j];
             if weight != 0 {
                 let at = (row / QUAD_SAMPLES + i) * CAGE_CONTROLS + column / QUAD_SAMPLES + j;
                 let k = control(upload, at);
@@ -107,14 +110,14 @@ pub(super) fn base_height(upload: &[u32], row: usize, column: usize) -> i32 {
 /// The residual of an even column: rows between two others continue them.
 fn even_column_residual(upload: &[u32], quantum: i32, row: usize, column: usize) -> i32 {
     let own = quantum * code(upload, row, column);
-    if row.is_multiple_of(2) {
+    if row % 2 == 0 {
         return own;
     }
-    ((quantum * (code(upload, row - 1, column) + code(upload, row + 1, column))) >> 1) + own
+    (quantum * (code(upload, row - 1, column) + code(upload, row + 1, column)) >> 1) + own
 }
 
 fn residual(upload: &[u32], quantum: i32, row: usize, column: usize) -> i32 {
-    if column.is_multiple_of(2) {
+    if column % 2 == 0 {
         return even_column_residual(upload, quantum, row, column);
     }
     let left = even_column_residual(upload, quantum, row, column - 1);
@@ -131,9 +134,11 @@ pub(super) fn code_prediction(upload: &[u32], quantum: i32, row: usize, column: 
 fn copy_rest(slot: &mut [u32], upload: &[u32]) {
     slot[VOIDS_WORD..STRIDE_ERRORS_WORD]
         .copy_from_slice(&upload[UPLOAD_VOIDS_WORD..UPLOAD_CODES_WORD]);
-    slot[CODES_WORD..CONTROLS_WORD].copy_from_slice(&upload[UPLOAD_CODES_WORD..UPLOAD_WORDS]);
+    slot[CODES_WORD..CONTROLS_WORD].copy_from_slice(&upload[UPLOAD_CODES_WORD..UPLOAD_CUT_WORD]);
     slot[CONTROLS_WORD..CONTROLS_WORD + CAGE_CONTROL_COUNT]
         .copy_from_slice(&upload[UPLOAD_CONTROLS_WORD..UPLOAD_DETAIL_WORD]);
+    let cut = &upload[UPLOAD_CUT_WORD..UPLOAD_WORDS];
+    slot[CUT_WORD..CUT_WORD + cut.len()].copy_from_slice(cut);
 }
 
 /// Heights of every sample, and what is copied.

@@ -6,33 +6,31 @@
 //! Based on: the feature processing unit of Lin, Wang, Sun, *Improved feature-adaptive subdivision for Catmull-Clark
 //! surface model*, 2018, with an error in pixels in place of its area ratio.
 
-use std::f32::consts::SQRT_2;
-
 use glam::{Vec2, Vec3};
 
 use super::shared::{
-    DrawnTile, Frame, NONE,
+    DrawnTile, Frame, NONE, TILE_CUT,
     border::{PATCH_COUNT, QUAD_SAMPLES, TILE_QUADS},
-    patch_word::FINEST_DEPTH,
-    pool::{Pages, pool_code, pool_stride_error},
+    patch_word::{DEPTH_CUT, FINEST_DEPTH},
+    pool::{Pages, pool_code, pool_cut, pool_stride_error},
 };
 
 /// 2^(n / 2): what nibble n of a patch code multiplies.
 const CODE_FACTORS: [f32; 15] = [
     1.0,
-    SQRT_2,
+    1.414_213_56,
     2.0,
-    2.0 * SQRT_2,
+    2.828_427_12,
     4.0,
-    4.0 * SQRT_2,
+    5.656_854_25,
     8.0,
-    8.0 * SQRT_2,
+    11.313_708_5,
     16.0,
-    16.0 * SQRT_2,
+    22.627_417,
     32.0,
-    32.0 * SQRT_2,
+    45.254_834,
     64.0,
-    64.0 * SQRT_2,
+    90.509_668,
     128.0,
 ];
 const CODE_NEVER: u32 = 15;
@@ -69,6 +67,9 @@ fn patch_error(tile: &DrawnTile, pages: &Pages<'_>, patch: u32, depth: u32, tole
 }
 
 fn patch_depth(frame: &Frame, tile: &DrawnTile, pages: &Pages<'_>, patch: u32) -> u32 {
+    if tile.flags & TILE_CUT != 0 && pool_cut(pages, tile.slot, patch) {
+        return FINEST_DEPTH | DEPTH_CUT;
+    }
     if frame.uniform_depth != NONE {
         return frame.uniform_depth.min(FINEST_DEPTH);
     }

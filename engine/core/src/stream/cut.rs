@@ -117,7 +117,7 @@ impl Wanted {
         self.by_level.iter_mut().for_each(Vec::clear);
         self.split(tree, rule, limit) && {
             self.balance(tree, rule);
-            self.collect(tree, rule);
+            self.collect(tree);
             self.nodes.len() <= limit.nodes && self.leaf_count <= limit.leaves
         }
     }
@@ -178,23 +178,18 @@ impl Wanted {
         }
     }
 
-    /// Lists the tree, level by level. Tiles that are there for balance alone have not been judged yet; they are not
-    /// split, since they gain no more than their parents, which were not worth it.
-    fn collect(&mut self, tree: &mut Tree, rule: &CutRule) {
+    /// Lists the tree, level by level.
+    fn collect(&mut self, tree: &Tree) {
         self.nodes.clear();
         self.nodes.push(Tree::ROOT);
         self.leaf_count = 0;
-        let (finest, mut at) = (tree.finest(), 0);
+        let mut at = 0;
         while let Some(&place) = self.nodes.get(at) {
-            let node = tree.node_mut(place);
-            if node.mark != self.run {
-                rule.judge(node, finest, self.run);
-                node.split = false;
-            }
+            let node = tree.node(place);
             let before = self.nodes.len();
-            if node.split {
-                let children = node.children.iter().filter(|&&child| child != NO_NODE);
-                self.nodes.extend(children);
+            if node.mark == self.run && node.split {
+                self.nodes
+                    .extend(node.children.iter().filter(|&&child| child != NO_NODE));
             }
             self.leaf_count += usize::from(self.nodes.len() == before);
             at += 1;
@@ -209,13 +204,14 @@ fn parents_around(tree: &Tree, id: TileId) -> impl Iterator<Item = TileId> + use
         .checked_sub(1)
         .map_or([0, 0], |level| tree.grid().tiles(level));
     let near = |at: u32| {
-        let parent = at / 2;
-        let other = if at.is_multiple_of(2) {
-            parent.checked_sub(1)
-        } else {
-            Some(parent + 1)
-        };
-        [Some(parent), other]
+        [
+            Some(at / 2),
+            if at % 2 == 0 {
+                (at / 2).checked_sub(1)
+            } else {
+                Some(at / 2 + 1)
+            },
+        ]
     };
     let rows = near(id.row).map(|row| row.filter(|&row| row < rows));
     let columns = near(id.column).map(|column| column.filter(|&column| column < columns));

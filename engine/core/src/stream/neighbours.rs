@@ -20,7 +20,7 @@ pub enum Side {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Neighbours {
     /// Across the north, east, south and west side; the west or north half first. Both halves are equal but where the
-    /// neighbours are finer.
+    /// neighbours are finer; of these one may be missing, where the data set ends in the middle of the side.
     pub sides: [[Side; 2]; 4],
     /// The drawn tile that owns each corner, NW, NE, SW, SE: the coarsest of those that touch it, of these the first
     /// by row and column.
@@ -28,9 +28,6 @@ pub struct Neighbours {
     /// The owner's sample at that corner, row by row.
     pub corner_sample: [u32; 4],
 }
-
-#[expect(clippy::cast_possible_truncation, reason = "it is 128")]
-const CELLS: u32 = TILE_CELLS as u32;
 
 /// The surroundings of a leaf.
 #[must_use]
@@ -78,12 +75,13 @@ fn corner_owner(tree: &Tree, leaf: &Leaf, corner: usize) -> (u32, u32) {
     let Some(owner) = coarse.min_by_key(|near| (near.id.level, near.id.row, near.id.column)) else {
         return (tree.node(leaf.node).drawn, 0);
     };
+    let cells = TILE_CELLS as u32;
     let up = id.level - owner.id.level;
-    // Samples from the owner's first to the corner; it touches the owner, so there are 0 to 128.
-    let sample = |corner: u32, first: u32| ((corner * CELLS) >> up) - first * CELLS;
-    let row = sample(id.row + u32::from(corner >= 2), owner.id.row);
-    let column = sample(id.column + u32::from(corner % 2 == 1), owner.id.column);
-    (owner.drawn, row * (CELLS + 1) + column)
+    let sample =
+        |at: u32, step: usize, first: u32| ((at + step as u32) * cells >> up) - first * cells;
+    let row = sample(id.row, south, owner.id.row);
+    let column = sample(id.column, east, owner.id.column);
+    (owner.drawn, row * (cells + 1) + column)
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! How a budget of GPU memory is divided.
 
 use crate::{
+    geo::PATCH_COUNT,
     pyramid::PyramidError,
     reference::shared::{DrawnTile, SLOT_WORDS, SLOTS_PER_PAGE},
 };
@@ -32,8 +33,8 @@ impl PoolSizes {
     /// A picture of 256 × 256 texels and its smaller versions.
     const LAYER_BYTES: u64 = 4 * 87_381;
     const SLOT_BYTES: u64 = 4 * SLOT_WORDS as u64;
-    /// Per drawn tile: its struct and a word a patch.
-    const DRAWN_BYTES: u64 = size_of::<DrawnTile>() as u64 + 4 * 1024;
+    /// Per drawn tile: its struct and three words a patch.
+    const DRAWN_BYTES: u64 = size_of::<DrawnTile>() as u64 + 3 * 4 * PATCH_COUNT as u64;
 
     /// Divides a budget: a quarter for indices and, where there is imagery, a quarter for it, each up to its limit; the
     /// rest for tiles.
@@ -68,7 +69,7 @@ impl PoolSizes {
         })
     }
 
-    /// Bytes of GPU memory in all.
+    /// Bytes of GPU memory in all; what a renderer needs besides (staging, uniforms, targets) is its own to count.
     #[must_use]
     pub fn byte_count(&self) -> u64 {
         u64::from(self.slots) * (Self::SLOT_BYTES + Self::DRAWN_BYTES)
