@@ -88,6 +88,18 @@ impl Residency {
         true
     }
 
+    /// The pool is empty.
+    pub(crate) fn empty_slots(&mut self, tree: &mut Tree) {
+        for place in 0..tree.places() {
+            let node = tree.node_mut(place);
+            if let Life::Uploaded { tile, .. } = &node.life {
+                node.life = Life::Resident(tile.clone());
+            }
+        }
+        self.slots = SlotPool::new(self.slots.capacity());
+        self.forget_victims();
+    }
+
     fn evict(&mut self, tree: &mut Tree, colors: &mut ColorPool, victim: u32) {
         let Some(bytes) = tree
             .node(victim)

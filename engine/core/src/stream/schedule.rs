@@ -181,7 +181,7 @@ impl Scheduler {
         }
         match texels {
             Some(texels) if texels.len() as u64 == COLOR_BYTES => {
-                colors.arrive(tree, place, texels)
+                colors.arrive(tree, place, texels);
             }
             _ => tree.node_mut(place).color = ColorLife::Nothing,
         }

@@ -5,6 +5,7 @@
 //! height_at, normal_at, raycast → Surface: the same integers on the CPU
 //! ```
 
+mod descriptor;
 pub mod feature_mesh;
 mod frame;
 mod frame_plan;
@@ -17,8 +18,9 @@ mod stats;
 mod surface;
 mod update;
 
+pub use descriptor::PlannerDescriptor;
 pub use frame_plan::{ColorUpload, FramePlan, Place, Upload};
-pub use planner::{Planner, PlannerDescriptor};
+pub use planner::Planner;
 pub use pool::PoolSizes;
 pub use raycast::Hit;
 pub use source::PyramidSource;

@@ -6,7 +6,7 @@ use super::*;
 use crate::{
     geo::TileId,
     reference::shared::NONE,
-    stream::{mix, synthetic::Synthetic},
+    stream::{Retry, mix, synthetic::Synthetic},
 };
 
 /// A GPU's memory, as far as it matters: which tile each slot and which picture each layer holds.
@@ -133,7 +133,7 @@ impl Journey {
     fn next(&mut self) -> View {
         self.step += 1;
         self.heading += 0.1 * self.random();
-        if self.step % 40 == 0 {
+        if self.step.is_multiple_of(40) {
             self.at = [
                 4000.0 * self.random(),
                 3000.0 * self.random(),
@@ -394,4 +394,33 @@ fn bad_budgets_and_bad_views_are_refused() {
     let mut planner = new(descriptor()).unwrap();
     let view = View::looking_at([f64::NAN; 3], [0.0; 3], 1.0, [64, 64]);
     assert!(planner.plan(&view).0.drawn.is_empty());
+}
+
+#[test]
+fn after_the_device_is_lost_all_is_uploaded_again_from_memory() {
+    let source = Synthetic::new(8000, 6000, 8).with_imagery(4);
+    let mut planner = planner(
+        source,
+        PlannerDescriptor {
+            vram_budget_bytes: 96 << 20,
+            ..descriptor()
+        },
+    );
+    let view = Journey::new(8).next();
+    rest(&mut planner, &view, 2000);
+    let before = planner.plan(&view).0;
+    planner.forget_uploads();
+    let mut pool = Pool::default();
+    for _ in 0..2000 {
+        std::thread::sleep(Duration::from_millis(1));
+        let (plan, stats) = planner.plan(&view);
+        pool.carry_out(&plan, &planner);
+        if stats.tiles_missing == 0 && stats.colors_missing == 0 {
+            let ids =
+                |plan: &FramePlan| plan.places.iter().map(|place| place.id).collect::<Vec<_>>();
+            assert_eq!(ids(&plan), ids(&before));
+            return;
+        }
+    }
+    panic!("tiles are missing");
 }

@@ -339,8 +339,8 @@ fn locate(at: f64, samples: u32) -> Option<(u32, usize, f64)> {
         reason = "at least 0 and under `samples`"
     )]
     let index = cell as u32;
-    let cells = TILE_CELLS as u32;
-    Some((index / cells, (index % cells) as usize, at - cell))
+    let (tile, cell_in_tile) = (index as usize / TILE_CELLS, index as usize % TILE_CELLS);
+    Some((u32::try_from(tile).ok()?, cell_in_tile, at - cell))
 }
 
 #[expect(
@@ -361,6 +361,10 @@ fn collider(kept: &Kept, frame: &TileFrame, stride: usize) -> Collider {
         ]
     };
     let mut indices = Vec::new();
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "at most 129 × 129 vertices"
+    )]
     let vertex = |[row, column]: [usize; 2]| (row * side + column) as u32;
     for (row, column) in
         (0..side - 1).flat_map(|row| (0..side - 1).map(move |column| (row, column)))
