@@ -77,7 +77,11 @@ impl Cage {
     /// # Errors
     /// [`CageError`] for a position that is not finite.
     pub fn moved(&self, to: impl Fn([f64; 3]) -> [f64; 3]) -> Result<Self, CageError> {
-        let positions: Vec<_> = self.positions.iter().map(|&position| to(position)).collect();
+        let positions: Vec<_> = self
+            .positions
+            .iter()
+            .map(|&position| to(position))
+            .collect();
         super::build::check_positions(&positions)?;
         Ok(Self {
             positions,

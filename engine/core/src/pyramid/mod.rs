@@ -4,6 +4,7 @@
 
 pub mod build;
 mod error;
+pub mod feature;
 mod files;
 mod metadata;
 mod patch_code;
@@ -11,7 +12,7 @@ mod query;
 mod reader;
 mod record;
 #[cfg(test)]
-mod sample;
+pub(crate) mod sample;
 mod shard;
 mod store;
 pub mod surface;

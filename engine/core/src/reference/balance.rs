@@ -60,9 +60,7 @@ fn raised_depths(tiles: &[DrawnTile], depths: &[u32], tile: u32, patch: u32) -> 
     let cut = if own & DEPTH_CUT == 0 { 0 } else { PACKED_CUT };
     (0..)
         .zip(neighbours)
-        .map(|(shift, deepest)| {
-            lessened(own, shift).max(deepest.saturating_sub(1)) << (2 * shift)
-        })
+        .map(|(shift, deepest)| lessened(own, shift).max(deepest.saturating_sub(1)) << (2 * shift))
         .fold(cut, |packed, depth| packed | depth)
 }
 

@@ -210,13 +210,3 @@ pub struct FeatureVertex {
     /// 0.
     pub reserved: u32,
 }
-
-/// A feature that a frame draws.
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct DrawnFeature {
-    /// Camera-relative metres of its origin.
-    pub origin: [f32; 3],
-    /// Where its tiles begin in the list of features' tiles.
-    pub first_tile: u32,
-}

@@ -101,13 +101,10 @@ impl Residency {
     }
 
     fn evict(&mut self, tree: &mut Tree, colors: &mut ColorPool, victim: u32) {
-        let Some(bytes) = tree
-            .node(victim)
-            .tile()
-            .map(|tile| tile.byte_count() as u64)
-        else {
+        if tree.node(victim).tile().is_none() {
             return;
-        };
+        }
+        let bytes = tree.node(victim).byte_count();
         let slot = tree.node(victim).slot();
         for child in tree
             .node(victim)

@@ -7,9 +7,12 @@
 
 mod descriptor;
 pub mod feature_mesh;
+mod feature_surface;
+mod features;
 mod frame;
 mod frame_plan;
 mod list;
+mod mesher;
 mod planner;
 mod pool;
 mod raycast;
@@ -19,7 +22,7 @@ mod surface;
 mod update;
 
 pub use descriptor::PlannerDescriptor;
-pub use frame_plan::{ColorUpload, FramePlan, Place, Upload};
+pub use frame_plan::{ColorUpload, FeatureDraw, FeatureUpload, FramePlan, Place, Upload};
 pub use planner::Planner;
 pub use pool::PoolSizes;
 pub use raycast::Hit;

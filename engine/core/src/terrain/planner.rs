@@ -18,7 +18,9 @@ use std::{
 };
 
 use super::{
-    ColorUpload, FramePlan, FrameStats, PlannerDescriptor, PoolSizes, Upload, frame::FrameBase,
+    ColorUpload, FramePlan, FrameStats, PlannerDescriptor, PoolSizes, Upload,
+    features::{FeaturePool, cut_bits},
+    frame::FrameBase,
     list,
 };
 use crate::{
@@ -44,6 +46,7 @@ pub struct Planner {
     room: Residency,
     colors: ColorPool,
     scheduler: Scheduler,
+    features: Option<FeaturePool>,
     motion: Motion,
     relaxation: Relaxation,
     limit: CutLimit,
@@ -72,6 +75,7 @@ impl Planner {
         descriptor: PlannerDescriptor,
     ) -> Result<Self, PyramidError> {
         let metadata = source.metadata();
+        let (descriptor, features) = set_features_aside(&*source, descriptor)?;
         let pool = PoolSizes::within(descriptor.vram_budget_bytes, metadata.color.is_some())?;
         let color_limit = descriptor.color_limit(&pool);
         let limit = descriptor.cut_limit(&pool, color_limit)?;
@@ -88,6 +92,7 @@ impl Planner {
             room,
             colors: ColorPool::new(metadata, pool.color_layers, descriptor.texel_px),
             scheduler: Scheduler::new(loader, descriptor.in_flight, descriptor.retry, color_limit),
+            features,
             motion: Motion::default(),
             relaxation: Relaxation::default(),
             limit,
@@ -113,11 +118,18 @@ impl Planner {
 
     /// What went wrong since the last call, each thing once, the first few.
     pub fn take_errors(&mut self) -> Vec<String> {
-        self.scheduler.take_errors()
+        let mut errors = self.scheduler.take_errors();
+        if let Some(features) = &mut self.features {
+            errors.append(&mut features.take_errors());
+        }
+        errors
     }
 
     /// The pool is empty: its device was lost. Tiles go there again from RAM, pictures are read again.
     pub fn forget_uploads(&mut self) {
+        if let Some(features) = &mut self.features {
+            features.forget_uploads();
+        }
         self.room.empty_slots(&mut self.tree);
         self.colors.empty_layers(&mut self.tree);
     }
@@ -146,6 +158,10 @@ impl Planner {
         let uploaded_bytes = self.upload(plan);
         self.drawn.find(&mut self.tree);
         list::fill(plan, &self.tree, &self.drawn, self.source.0.metadata());
+        if let Some(features) = &mut self.features {
+            let how = (self.number, self.descriptor.wait_for_tiles);
+            features.plan(plan, &self.tree, &self.drawn, view, how);
+        }
         plan.frame = Some(self.base.frame(view, rule.tolerance, plan.drawn.len()));
         plan.aim(view);
         let mut stats = FrameStats {
@@ -325,7 +341,13 @@ impl Planner {
                 slot,
             };
             let step = list::step(&self.tree, id);
-            plan.uploads.push(Upload { slot, tile, step });
+            let cut = cut_bits(id, &self.tree.node(place).features);
+            plan.uploads.push(Upload {
+                slot,
+                tile,
+                step,
+                cut,
+            });
         }
         spent
     }
@@ -394,6 +416,11 @@ impl Planner {
             slots_used,
             color_layers_used: self.colors.used(),
             failures: self.scheduler.failures(),
+            features_drawn: plan.features.len(),
+            feature_bytes: self
+                .features
+                .as_ref()
+                .map_or([0; 2], FeaturePool::byte_counts),
             ..FrameStats::default()
         }
     }
@@ -415,6 +442,22 @@ impl Planner {
         }
         if whole > 0.0 { missing / whole } else { 0.0 }
     }
+}
+
+/// A share of both budgets for features, where there are any.
+fn set_features_aside(
+    source: &dyn TileSource,
+    mut descriptor: PlannerDescriptor,
+) -> Result<(PlannerDescriptor, Option<FeaturePool>), PyramidError> {
+    if !source.has_features() {
+        return Ok((descriptor, None));
+    }
+    let ram = descriptor.ram_budget_bytes / PlannerDescriptor::FEATURE_SHARE;
+    let vram = descriptor.vram_budget_bytes / PlannerDescriptor::FEATURE_SHARE;
+    descriptor.ram_budget_bytes -= ram;
+    descriptor.vram_budget_bytes -= vram;
+    let pool = FeaturePool::new(ram, vram, source.metadata().unit())?;
+    Ok((descriptor, Some(pool)))
 }
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 //! Twin: `shaders/shared/pool.wgsl`.
 
 use super::{
-    CODES_WORD, CUT_WORD, HEIGHTS_WORD, SLOPES_WORD, SLOT_WORDS, SLOTS_PER_PAGE, STRIDE_ERRORS_WORD,
-    VOIDS_WORD,
+    CODES_WORD, CUT_WORD, HEIGHTS_WORD, SLOPES_WORD, SLOT_WORDS, SLOTS_PER_PAGE,
+    STRIDE_ERRORS_WORD, VOIDS_WORD,
 };
 
 /// The pages, in binding order; unused ones are empty.

@@ -173,7 +173,9 @@ impl Builder<'_> {
             On::Edge(edge, along) if 2 * along == ONE && self.shape.is_border_edge(edge) => {
                 let ends = self.shape.cage.topology().edge_vertices(edge);
                 let [a, b] = ends.map(|end| self.shape.samples[end as usize]);
-                Some([0, 1].map(|axis| u32::midpoint(a.unwrap_or_default()[axis], b.unwrap_or_default()[axis])))
+                Some([0, 1].map(|axis| {
+                    u32::midpoint(a.unwrap_or_default()[axis], b.unwrap_or_default()[axis])
+                }))
             }
             _ => None,
         }
@@ -183,8 +185,7 @@ impl Builder<'_> {
         let shape = self.shape;
         let side = ONE >> place.level;
         let first = [place.u, place.v].map(|at| u32::from(at) * side);
-        let local =
-            [0, 1].map(|axis| f64::from(at[axis] - first[axis]) / f64::from(side));
+        let local = [0, 1].map(|axis| f64::from(at[axis] - first[axis]) / f64::from(side));
         let mut sample = piece.evaluate(&self.points, local);
         if shape.in_ring[place.face as usize] {
             self.add_offset(&mut sample);
@@ -193,21 +194,21 @@ impl Builder<'_> {
         let start = cut.first_sample();
         let (tile, border) = if let Some([x, y]) = self.sample(on) {
             let rise = f64::from(shape.height([x, y])) * cut.unit - shape.origin[2];
-            sample.position = [
-                f64::from(x) * cut.step[0],
-                f64::from(y) * cut.step[1],
-                rise,
-            ];
+            sample.position = [f64::from(x) * cut.step[0], f64::from(y) * cut.step[1], rise];
             let (tile, [row, column]) = cut.tile_at([start[0] + y, start[1] + x]);
-            (tile, tile << SAMPLE_BITS | (row * TILE_SAMPLES as u32 + column))
+            (
+                tile,
+                tile << SAMPLE_BITS | (row * TILE_SAMPLES as u32 + column),
+            )
         } else {
             (self.tile_under(sample.position), NONE)
         };
         let mesh = &mut self.mesh;
         let vertex = u32::try_from(mesh.positions.len()).unwrap_or(NONE);
         mesh.positions.push(narrow(sample.position));
-        mesh.normals
-            .push(narrow(unit(cross(sample.du, sample.dv)).unwrap_or_default()));
+        mesh.normals.push(narrow(
+            unit(cross(sample.du, sample.dv)).unwrap_or_default(),
+        ));
         mesh.border.push(border);
         mesh.tiles.push(tile);
         vertex

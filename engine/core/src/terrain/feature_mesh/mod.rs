@@ -18,8 +18,7 @@
 mod border;
 mod build;
 mod shape;
-#[cfg(test)]
-pub(crate) mod testing;
+pub mod synthetic;
 #[cfg(test)]
 mod tests;
 

@@ -272,13 +272,12 @@ fn ring_faces(laid: &Cage, size: [u32; 2]) -> Vec<bool> {
         let is_lattice = spans
             .iter()
             .all(|[low, high]| high - low == quad && low % quad == 0.0);
-        let touches = (0..2).any(|axis| {
-            spans[axis][0] == 0.0 || spans[axis][1] == f64::from(size[axis])
-        });
+        let touches =
+            (0..2).any(|axis| spans[axis][0] == 0.0 || spans[axis][1] == f64::from(size[axis]));
         is_lattice && touches
     };
-    let parents = (0..topology.face_count())
-        .map(|face| (is_ring(face), topology.face_corners(face).len()));
+    let parents =
+        (0..topology.face_count()).map(|face| (is_ring(face), topology.face_corners(face).len()));
     parents
         .flat_map(|(is_ring, corners)| std::iter::repeat_n(is_ring, corners))
         .collect()

@@ -4,13 +4,24 @@ use std::collections::HashMap;
 
 use super::{
     FeatureMesh, FeatureShape,
-    testing::{ARCH_PATCHES, arch_shape},
+    synthetic::{ARCH_PATCHES, arch_cage, arch_place, ground_control},
 };
 use crate::reference::shared::NONE;
 
+/// The arch's shape, on samples that are off the limit surface.
+fn arch_shape() -> FeatureShape {
+    let cage = arch_cage(200.0, ground_control);
+    FeatureShape::new(&cage, arch_place(1.0, 0.125), |[row, column]| {
+        (810 + (row * 7 + column * 5) % 13).cast_signed()
+    })
+    .unwrap()
+}
+
 fn depths(shape: &FeatureShape, seed: u64, most: u64) -> Vec<u8> {
     (0..shape.vertex_count())
-        .map(|vertex| u8::try_from(crate::stream::mix(seed ^ u64::from(vertex)) % (most + 1)).unwrap())
+        .map(|vertex| {
+            u8::try_from(crate::stream::mix(seed ^ u64::from(vertex)) % (most + 1)).unwrap()
+        })
         .collect()
 }
 
@@ -43,7 +54,10 @@ fn a_mesh_is_closed_but_for_the_cuts_border_whatever_its_depths() {
             let at = |corner: &[u32; 3]| corner.map(f32::from_bits);
             let (a, b) = (at(a), at(b));
             let length = (a[0] - b[0]).abs() + (a[1] - b[1]).abs();
-            assert!((length - 1.0).abs() < 1e-6, "stride 1 along the border: {a:?} {b:?}");
+            assert!(
+                (length - 1.0).abs() < 1e-6,
+                "stride 1 along the border: {a:?} {b:?}"
+            );
         }
     }
 }
@@ -103,16 +117,24 @@ fn nearer_eyes_get_deeper_meshes_and_the_arch_stands_above_the_ground() {
     assert!(near.iter().max() > far.iter().max());
     let (near, far) = (shape.mesh(&near).unwrap(), shape.mesh(&far).unwrap());
     assert!(near.indices.len() > far.indices.len());
-    let top = near.positions.iter().map(|position| position[2]).fold(0.0, f32::max);
+    let top = near
+        .positions
+        .iter()
+        .map(|position| position[2])
+        .fold(0.0, f32::max);
     assert!((15.0..40.0).contains(&top), "{top}");
     assert_eq!(near.draw_indices().len(), near.indices.len());
-    assert_eq!(shape.mesh(&at(30.0)).unwrap(), near, "same input, same mesh");
+    assert_eq!(
+        shape.mesh(&at(30.0)).unwrap(),
+        near,
+        "same input, same mesh"
+    );
 }
 
 #[test]
 fn a_cage_of_another_cut_is_refused() {
-    let cage = super::testing::arch_cage(100.0, |_, _| 0.0);
-    let mut place = super::testing::arch_place(1.0, 0.125);
+    let cage = arch_cage(100.0, |_, _| 0.0);
+    let mut place = arch_place(1.0, 0.125);
     place.cut[2] += 1;
     assert!(FeatureShape::new(&cage, place, |_| 0).is_err());
 }

@@ -1,10 +1,10 @@
-//! A laid cage made by hand: a rock arch on rough ground, as the builder would lay it.
+//! A laid cage made by hand, for tests: a rock arch, as the builder would lay it into the ground.
 
-use super::{CutPlace, FeatureShape};
+use super::CutPlace;
 use crate::cage::{Cage, Crease, Faces, Tags};
 
 /// Patches of the cut: rows, columns.
-pub(crate) const ARCH_PATCHES: [u32; 2] = [8, 12];
+pub const ARCH_PATCHES: [u32; 2] = [8, 12];
 /// Columns and row of the patches that the arch stands on.
 const FEET: [u32; 2] = [3, 8];
 const FOOT_ROW: u32 = 3;
@@ -19,8 +19,13 @@ struct Laid {
 }
 
 /// A lattice over the cut and its ghost ring, heights from `control` (row, column in lattice points), and an arch of
-/// `height` units on two of its patches.
-pub(crate) fn arch_cage(height: f64, control: impl Fn(i32, i32) -> f64) -> Cage {
+/// `height` units on two of its patches; one side of a foot is a crease.
+///
+/// # Panics
+///
+/// Where `control` gives what is no number.
+#[must_use]
+pub fn arch_cage(height: f64, control: impl Fn(i32, i32) -> f64) -> Cage {
     let [rows, columns] = ARCH_PATCHES;
     let mut laid = Laid {
         positions: Vec::new(),
@@ -88,8 +93,11 @@ fn tube(laid: &mut Laid, height: f64) {
             let middle = 0.5 * (a[0] + b[0]);
             let radius = 0.5 * (b[0] - a[0]).abs();
             let z = a[2] + (b[2] - a[2]) * share + height * radius / 14.0 * angle.sin();
-            laid.positions
-                .push([middle - radius * angle.cos() * (b[0] - a[0]).signum(), a[1], z]);
+            laid.positions.push([
+                middle - radius * angle.cos() * (b[0] - a[0]).signum(),
+                a[1],
+                z,
+            ]);
             u32::try_from(laid.positions.len() - 1).expect("few")
         });
         stitch(laid, ring, next);
@@ -107,7 +115,8 @@ fn stitch(laid: &mut Laid, low: [u32; 4], high: [u32; 4]) {
 }
 
 /// Where the arch's cut lies: across a tile border.
-pub(crate) fn arch_place(step: f64, unit: f64) -> CutPlace {
+#[must_use]
+pub fn arch_place(step: f64, unit: f64) -> CutPlace {
     let (row, column) = (5, 26);
     CutPlace {
         cut: [row, column, row + ARCH_PATCHES[0], column + ARCH_PATCHES[1]],
@@ -118,15 +127,7 @@ pub(crate) fn arch_place(step: f64, unit: f64) -> CutPlace {
 }
 
 /// Controls of the ground around the arch, in units, by lattice point of the cut.
-pub(crate) fn ground_control(row: i32, column: i32) -> f64 {
+#[must_use]
+pub fn ground_control(row: i32, column: i32) -> f64 {
     f64::from(800 + (row * 37 + column * 53) % 23 + 2 * row)
-}
-
-/// The arch's shape, on samples that are off the limit surface.
-pub(crate) fn arch_shape() -> FeatureShape {
-    let cage = arch_cage(200.0, ground_control);
-    FeatureShape::new(&cage, arch_place(1.0, 0.125), |[row, column]| {
-        (810 + (row * 7 + column * 5) % 13).cast_signed()
-    })
-    .expect("a shape")
 }

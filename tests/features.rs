@@ -1,0 +1,143 @@
+//! An arch of stone in the ground, streamed and drawn: no gap along its border, daylight under it.
+
+use std::sync::Arc;
+
+use drumlin::{
+    Headless, Look, Offscreen, Pace, Terrain, TerrainDescriptor, TerrainSource, View, wgpu,
+};
+use drumlin_tests::scene::HillSource;
+
+const SIZE: [u32; 2] = [640, 360];
+
+/// World x and y of the arch's middle; it spans 80 m from west to east.
+const ARCH: [f64; 2] = [-512.0, 886.0];
+
+fn terrain(gpu: &Headless) -> Terrain {
+    let source = Arc::new(HillSource::with_arch());
+    let descriptor = TerrainDescriptor {
+        pace: Pace::Complete,
+        vram_budget_bytes: 64 << 20,
+        ..TerrainDescriptor::with_source(TerrainSource::Tiles(source))
+    };
+    Terrain::new(&gpu.device, &gpu.queue, descriptor).expect("a terrain")
+}
+
+/// Metres along the view axis for every pixel; features drawn.
+fn draw(gpu: &Headless, terrain: &mut Terrain, name: &str, view: &View) -> (usize, Vec<f32>) {
+    let target = Offscreen::new(&gpu.device, SIZE);
+    let report = terrain.update(view);
+    assert!(report.errors.is_empty(), "{:?}", report.errors);
+    let mut encoder = gpu
+        .device
+        .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    terrain.prepare(&gpu.device, &gpu.queue, &mut encoder);
+    terrain.draw(&mut target.color_pass(&mut encoder, [1.0, 0.0, 1.0, 1.0], None));
+    terrain.draw_distances(&mut target.distance_pass(&mut encoder));
+    gpu.queue.submit([encoder.finish()]);
+    let distances = target
+        .read_distance(&gpu.device, &gpu.queue)
+        .expect("distances");
+    let color = target
+        .read_color(&gpu.device, &gpu.queue)
+        .expect("a picture");
+    gpu.finish().expect("no complaint");
+    save(name, &color);
+    (report.stats.features_drawn, distances)
+}
+
+/// Keeps a picture for a look at it, where `DRUMLIN_PICTURES` names a folder.
+fn save(name: &str, color: &[u8]) {
+    if let Some(folder) = std::env::var_os("DRUMLIN_PICTURES") {
+        let path = std::path::Path::new(&folder).join(name);
+        image::save_buffer(path, color, SIZE[0], SIZE[1], image::ColorType::Rgba8).expect("a PNG");
+    }
+}
+
+fn ground(terrain: &Terrain) -> f64 {
+    terrain
+        .height_at([ARCH[0], ARCH[1] - 40.0])
+        .expect("it can be read")
+        .expect("ground")
+}
+
+#[test]
+fn an_arch_has_no_gap_along_its_border_from_any_side() {
+    let Some(gpu) = drumlin_tests::gpu() else {
+        return;
+    };
+    let mut terrain = terrain(&gpu);
+    let z = ground(&terrain);
+    for (at, height) in [(0_u32, 220.0), (1, 140.0), (2, 140.0), (3, 90.0), (4, 60.0)] {
+        let turn = f64::from(at) * 1.3;
+        let out = if at == 0 { 1.0 } else { 70.0 };
+        let eye = [
+            ARCH[0] + out * turn.cos(),
+            ARCH[1] - 30.0 + out * turn.sin(),
+            z + height,
+        ];
+        let view = View::looking_at(eye, [ARCH[0], ARCH[1] - 30.0, z], 0.8, SIZE);
+        let name = format!("arch_above_{at}.png");
+        let (features, distances) = draw(&gpu, &mut terrain, &name, &view);
+        assert_eq!(features, 1);
+        let holes = distances
+            .iter()
+            .filter(|distance| distance.is_infinite())
+            .count();
+        assert_eq!(holes, 0, "view {at}");
+    }
+}
+
+#[test]
+fn there_is_daylight_under_the_arch_and_stone_above_it() {
+    let Some(gpu) = drumlin_tests::gpu() else {
+        return;
+    };
+    let mut terrain = terrain(&gpu);
+    let z = ground(&terrain);
+    let distance = 170.0;
+    let eye = [ARCH[0], ARCH[1] - distance, z + 14.0];
+    let view = View::looking_at(eye, [ARCH[0], ARCH[1], z + 14.0], 0.7, SIZE);
+    let (features, distances) = draw(&gpu, &mut terrain, "arch.png", &view);
+    assert_eq!(features, 1);
+    let middle = |row: usize| distances[row * SIZE[0] as usize + SIZE[0] as usize / 2];
+    let is_stone = |row: &usize| (f64::from(middle(*row)) - distance).abs() < 12.0;
+    let rows = 0..SIZE[1] as usize / 2;
+    let first = rows.clone().find(is_stone).expect("the arch's crown");
+    let below = (first..SIZE[1] as usize / 2)
+        .find(|row| !is_stone(row))
+        .expect("its underside");
+    assert!(first > 4, "sky above the arch");
+    let daylight = (below..SIZE[1] as usize / 2)
+        .filter(|&row| middle(row) > 190.0)
+        .count();
+    assert!(daylight > 25, "{daylight} rows under the arch");
+    // Below the first ground in a column, nothing is missing but what is seen under the arch.
+    for column in [20, 620] {
+        let mut rows =
+            (0..SIZE[1] as usize).map(|row| distances[row * SIZE[0] as usize + column].is_finite());
+        assert!(rows.by_ref().any(|is_ground| is_ground));
+        assert!(rows.all(|is_ground| is_ground), "column {column}");
+    }
+}
+
+#[test]
+fn engine_colours_show_the_arch_too_and_far_away_its_ground_is_drawn() {
+    let Some(gpu) = drumlin_tests::gpu() else {
+        return;
+    };
+    let mut terrain = terrain(&gpu);
+    let z = ground(&terrain);
+    let near = [ARCH[0] + 60.0, ARCH[1] - 130.0, z + 60.0];
+    let target = [ARCH[0], ARCH[1], z + 10.0];
+    terrain.set_look(Look {
+        depth_colors: true,
+        wireframe: true,
+        ..terrain.look()
+    });
+    let view = View::looking_at(near, target, 0.8, SIZE);
+    let (features, _) = draw(&gpu, &mut terrain, "arch_depths.png", &view);
+    assert_eq!(features, 1);
+    let view = View::looking_at([9000.0, -9000.0, 3000.0], target, 0.8, SIZE);
+    let (features, _) = draw(&gpu, &mut terrain, "arch_far.png", &view);
+    assert_eq!(features, 0);
+}
