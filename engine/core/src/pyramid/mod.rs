@@ -2,10 +2,38 @@
 //!
 //! `FORMAT.md` beside this crate draws every byte. Knows files and numbers; knows no camera and no screen.
 
+pub mod build;
 mod error;
+mod files;
 mod metadata;
+mod patch_code;
+mod query;
+mod reader;
+mod record;
+#[cfg(test)]
+mod sample;
+mod shard;
+mod store;
+pub mod surface;
+pub mod templates;
 mod tile;
+mod validate;
+mod writer;
+mod zarr;
+#[cfg(test)]
+mod zarr_python;
 
 pub use error::PyramidError;
 pub use metadata::{ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};
+pub use patch_code::{HALF_OCTAVES, NEVER, patch_error, patch_nibble};
+pub use query::Heights;
+pub use reader::Pyramid;
+pub use record::{Record, RecordLayout, RecordParts, VOID_BYTES, number_bytes};
+pub use shard::{SHARD_TILES, shard_count, shard_shape};
+pub use store::{FaultStore, Faults, FileStore, MappedStore, Store, StoreError};
 pub use tile::{Summary, Tile};
+pub use validate::{Finding, Report, validate};
+pub use writer::{PyramidWriter, ShardInfo};
+
+/// Texels a side of a colour tile.
+pub const COLOR_TEXELS: usize = 256;

@@ -1,0 +1,452 @@
+//! Whole builds of small rasters, decoded again.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use super::testing::{Field, hills, shared};
+use super::*;
+use crate::dem::{self, OpenOptions, Window};
+use crate::geo::{PATCH_COUNT, TILE_SAMPLES, TileId};
+use crate::pyramid::surface::{decode_controls, decode_heights};
+use crate::pyramid::{Record, RecordLayout, Summary, patch_error};
+
+/// A built pyramid in memory: every record, and heights decoded as a reader does, from records alone.
+struct Built {
+    plan: Plan,
+    levels: Levels,
+    records: BTreeMap<TileId, Record>,
+}
+
+impl Built {
+    fn new(raster: &dyn Raster, eps: Option<f64>) -> Result<Self, PyramidError> {
+        let options = BuildOptions {
+            eps,
+            ..BuildOptions::default()
+        };
+        let plan = Plan::new(raster, None, &options)?;
+        let cancel = AtomicBool::new(false);
+        let watch = Watch::new(&|_| (), &cancel);
+        let levels = Levels::new(raster, &plan.scale, &watch)?;
+        let measures = measure_all(&levels, &plan.grid, plan.scale.unit(), &watch)?;
+        let mut records = BTreeMap::new();
+        for (level, about) in (0..).zip(&levels.levels) {
+            let layout = RecordLayout::new(about);
+            for (row, column) in (0..about.tiles[0])
+                .flat_map(|row| (0..about.tiles[1]).map(move |column| (row, column)))
+            {
+                let tile = TileId::new(level, row, column);
+                let bytes = records::record(&levels, &measures, &plan.grid, &layout, tile);
+                records.insert(tile, layout.decode(&bytes).unwrap());
+            }
+        }
+        Ok(Self {
+            plan,
+            levels,
+            records,
+        })
+    }
+
+    fn controls(&self, tile: TileId) -> Vec<i32> {
+        let level = &self.levels.levels[usize::from(tile.level)];
+        let cage = &self.records[&tile].cage;
+        match tile.parent().filter(|_| !level.key) {
+            None => cage.to_vec(),
+            Some(parent) => {
+                decode_controls(&self.controls(parent), tile.quadrant(), cage, level.step)
+            }
+        }
+    }
+
+    fn heights(&self, tile: TileId) -> Vec<i32> {
+        let step = self.levels.levels[usize::from(tile.level)].step;
+        decode_heights(&self.controls(tile), &self.records[&tile].detail, step)
+    }
+
+    fn is_void(&self, tile: TileId, index: usize) -> bool {
+        self.records[&tile]
+            .voids
+            .as_ref()
+            .is_some_and(|bits| bits[index / 8] >> (index % 8) & 1 == 1)
+    }
+
+    /// The finest samples, decoded: none where void.
+    fn finest(&self) -> Vec<Vec<Option<i32>>> {
+        let [rows, columns] =
+            [self.plan.grid.rows, self.plan.grid.columns].map(|count| count as usize);
+        let mut field = vec![vec![None; columns]; rows];
+        let finest = self.plan.grid.level_count() - 1;
+        for tile in self.records.keys().filter(|tile| tile.level == finest) {
+            let heights = self.heights(*tile);
+            for (index, height) in heights.iter().enumerate() {
+                let [row, column] = [
+                    tile.row as usize * 128 + index / 129,
+                    tile.column as usize * 128 + index % 129,
+                ];
+                if row < rows && column < columns && !self.is_void(*tile, index) {
+                    field[row][column] = Some(*height);
+                }
+            }
+        }
+        field
+    }
+
+    /// Checks every finest sample against its source.
+    fn check_bound(&self, raster: &dyn Raster) {
+        let grid = raster.header().grid;
+        let mut source = vec![0.0; grid.rows as usize * grid.columns as usize];
+        raster.read(Window::whole(&grid), &mut source).unwrap();
+        let (unit, eps) = (self.plan.scale.unit(), self.plan.scale.eps);
+        for (row, line) in self.finest().iter().enumerate() {
+            for (column, height) in line.iter().enumerate() {
+                let want = source[row * grid.columns as usize + column];
+                match height {
+                    None => assert!(want.is_nan(), "row {row}, column {column} is void"),
+                    Some(height) => {
+                        let error = (f64::from(*height) * unit - want).abs();
+                        assert!(error <= eps, "row {row}, column {column}: {error}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// Checks that neighbours of every level hold equal heights and void bits on their common border.
+    fn check_borders(&self) {
+        for tile in self.records.keys() {
+            let east = TileId::new(tile.level, tile.row, tile.column + 1);
+            let south = TileId::new(tile.level, tile.row + 1, tile.column);
+            let pairs: [(TileId, [usize; 2], usize); 2] =
+                [(east, [128, 0], 129), (south, [128 * 129, 0], 1)];
+            for (other, [mine, theirs], stride) in pairs {
+                if !self.records.contains_key(&other) {
+                    continue;
+                }
+                let (a, b) = (self.heights(*tile), self.heights(other));
+                for step in 0..TILE_SAMPLES {
+                    let [mine, theirs] = [mine + step * stride, theirs + step * stride];
+                    assert_eq!(a[mine], b[theirs], "{tile} and {other}");
+                    assert_eq!(
+                        self.is_void(*tile, mine),
+                        self.is_void(other, theirs),
+                        "{tile} and {other}"
+                    );
+                }
+            }
+        }
+    }
+
+    /// Checks a tile's error by going over all finest samples under it, one by one.
+    fn check_error(&self, tile: TileId) {
+        let (heights, finest, grid) = (self.heights(tile), self.finest(), &self.plan.grid);
+        let stride = f64::from(grid.stride(tile.level));
+        let [first_row, first_column] = grid.first_sample(tile).map(|first| first as f64);
+        let mut worst = 0.0_f64;
+        for (row, line) in finest.iter().enumerate() {
+            for (column, height) in line.iter().enumerate() {
+                let [y, x] = [
+                    (row as f64 - first_row) / stride,
+                    (column as f64 - first_column) / stride,
+                ];
+                let Some(height) =
+                    height.filter(|_| (0.0..=128.0).contains(&y) && (0.0..=128.0).contains(&x))
+                else {
+                    continue;
+                };
+                let [i, j] = [y, x].map(|place| place.floor().min(127.0));
+                let at = |i: f64, j: f64| f64::from(heights[(i * 129.0 + j) as usize]);
+                let (v, w) = (y - i, x - j);
+                let [nw, ne, sw, se] = [
+                    at(i, j),
+                    at(i, j + 1.0),
+                    at(i + 1.0, j),
+                    at(i + 1.0, j + 1.0),
+                ];
+                let drawn = if w >= v {
+                    nw + (ne - nw) * w + (se - ne) * v
+                } else {
+                    nw + (sw - nw) * v + (se - sw) * w
+                };
+                worst = worst.max((drawn - f64::from(height)).abs());
+            }
+        }
+        let record = &self.records[&tile];
+        let children = record
+            .children
+            .iter()
+            .map(|child| f64::from(child.error))
+            .fold(0.0, f64::max);
+        let stated = f64::from(record.summary.error);
+        let truth = (worst * self.plan.scale.unit()).max(children);
+        assert!(
+            stated >= truth && stated <= truth * 1.000_001,
+            "{tile}: {stated} {truth}"
+        );
+    }
+}
+
+fn built(raster: &dyn Raster, eps: Option<f64>) -> Built {
+    Built::new(raster, eps).unwrap()
+}
+
+fn options(folder: &Path, name: &str, threads: usize) -> BuildOptions {
+    BuildOptions {
+        output: folder.join(name),
+        threads: Some(threads),
+        eps: Some(2.0),
+        ..BuildOptions::default()
+    }
+}
+
+fn run(raster: &dyn Raster, options: &BuildOptions) -> Result<BuildReport, PyramidError> {
+    build(raster, None, options, &|_| (), &AtomicBool::new(false))
+}
+
+/// Every file below a folder and what is in it.
+fn tree(folder: &Path, below: &str, files: &mut BTreeMap<String, Vec<u8>>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let entry = entry.unwrap();
+        let name = format!("{below}/{}", entry.file_name().to_string_lossy());
+        if entry.path().is_dir() {
+            tree(&entry.path(), &name, files);
+        } else {
+            files.insert(name, fs::read(entry.path()).unwrap());
+        }
+    }
+}
+
+#[test]
+fn every_sample_is_within_the_bound_and_borders_are_shared() {
+    let field = Field::new(300, 421, hills);
+    for eps in [None, Some(0.3), Some(3.0), Some(40.0)] {
+        let built = built(&field, eps);
+        built.check_bound(&field);
+        built.check_borders();
+    }
+}
+
+#[test]
+fn whole_metres_come_back_exactly_by_default() {
+    let field = Field::new(140, 150, hills);
+    let built = built(&field, None);
+    for (row, line) in built.finest().iter().enumerate() {
+        for (column, height) in line.iter().enumerate() {
+            let metres = f64::from(height.unwrap()) * built.plan.scale.unit();
+            assert_eq!(metres.round(), field.at(row, column));
+        }
+    }
+}
+
+#[test]
+fn rasters_of_one_row_or_column_or_sample_build() {
+    for (rows, columns) in [(1, 1), (1, 200), (300, 1), (2, 2), (129, 129), (130, 3)] {
+        let field = Field::new(rows, columns, hills);
+        let built = built(&field, Some(1.0));
+        built.check_bound(&field);
+        built.check_borders();
+        assert_eq!(
+            built.levels.levels.len(),
+            usize::from(field.header().grid.level_count())
+        );
+    }
+}
+
+#[test]
+fn tile_errors_are_true() {
+    let field = Field::new(290, 400, |row, column| {
+        if row.abs_diff(120) < 9 {
+            f64::NAN
+        } else {
+            hills(row, column)
+        }
+    });
+    let built = built(&field, Some(2.0));
+    for tile in [
+        TileId::ROOT,
+        TileId::new(1, 0, 0),
+        TileId::new(1, 0, 1),
+        TileId::new(1, 1, 0),
+        TileId::new(2, 1, 1),
+    ] {
+        built.check_error(tile);
+    }
+}
+
+#[test]
+fn summaries_enclose_all_below() {
+    let built = built(&Field::new(300, 421, hills), Some(2.0));
+    for (tile, record) in &built.records {
+        let heights = built.heights(*tile);
+        assert!(
+            heights
+                .iter()
+                .all(|height| (record.summary.min..=record.summary.max).contains(height))
+        );
+        for (child, summary) in tile.children().iter().zip(record.children) {
+            assert_eq!(
+                summary,
+                built
+                    .records
+                    .get(child)
+                    .map_or(Summary::default(), |child| child.summary)
+            );
+            let inside = summary.min >= record.summary.min && summary.max <= record.summary.max;
+            assert!(!summary.is_present() || inside && summary.error <= record.summary.error);
+        }
+    }
+}
+
+#[test]
+fn patch_codes_are_no_less_than_the_patches_errors() {
+    let built = built(&Field::new(300, 421, hills), Some(2.0));
+    let (grid, unit) = (&built.plan.grid, built.plan.scale.unit());
+    let finest = Finest::new(built.levels.samples.last().unwrap(), [300, 421]);
+    for (tile, record) in &built.records {
+        let first = grid.first_sample(*tile).map(|first| first as usize);
+        let errors = measure::measure(
+            &built.heights(*tile),
+            first,
+            grid.stride(tile.level) as usize,
+            &finest,
+        );
+        let base = record.summary.error.max(unit as f32);
+        for patch in 0..PATCH_COUNT {
+            let code = record.patch_codes[patch];
+            for (nibble, error) in [code & 15, code >> 4]
+                .into_iter()
+                .zip(errors.patches[patch])
+            {
+                assert!(f64::from(patch_error(nibble, base)) >= error * unit);
+                assert!(nibble == 0 || f64::from(patch_error(nibble - 1, base)) < error * unit);
+            }
+        }
+    }
+}
+
+#[test]
+fn voids_are_masked_and_filled_smoothly() {
+    let hole = |row: u32, column: u32| row.abs_diff(130) < 30 && column.abs_diff(140) < 40;
+    let field = Field::new(300, 300, |row, column| {
+        if hole(row, column) {
+            f64::NAN
+        } else {
+            hills(row, column)
+        }
+    });
+    let built = built(&field, Some(1.0));
+    built.check_bound(&field);
+    built.check_borders();
+    let root = &built.records[&TileId::ROOT];
+    assert_eq!(root.summary.flags, Summary::PRESENT | Summary::VOID);
+    let range = f64::from(root.summary.max - root.summary.min) * built.plan.scale.unit();
+    assert!(range < 900.0, "{range}");
+}
+
+#[test]
+fn a_tile_in_the_middle_of_a_void_is_all_void() {
+    let field = Field::new(600, 600, |row, column| {
+        if row < 500 && column < 500 {
+            f64::NAN
+        } else {
+            10.0
+        }
+    });
+    let built = built(&field, Some(1.0));
+    let flags = built.records[&TileId::new(3, 1, 1)].summary.flags;
+    assert_eq!(flags, Summary::PRESENT | Summary::VOID | Summary::ALL_VOID);
+}
+
+#[test]
+fn all_void_is_refused_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let field = Field::new(40, 50, |_, _| f64::NAN);
+    let error = run(&field, &options(folder.path(), "out", 1)).unwrap_err();
+    assert!(error.to_string().contains("void"), "{error}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn a_memory_budget_too_small_is_refused_beforehand() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = BuildOptions {
+        memory_budget: Some(1 << 20),
+        ..options(folder.path(), "out", 1)
+    };
+    let error = run(&Field::new(400, 500, hills), &options)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("400 x 500") && error.contains("the budget is 1 MiB"),
+        "{error}"
+    );
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn any_number_of_threads_writes_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let field = Field::new(700, 421, |row, column| {
+        if row.abs_diff(200) < 9 {
+            f64::NAN
+        } else {
+            hills(row, column)
+        }
+    });
+    let trees = [1, 4].map(|threads| {
+        let options = options(folder.path(), &format!("out{threads}"), threads);
+        let report = run(&field, &options).unwrap();
+        assert_eq!(
+            (report.samples, report.levels, report.void_samples),
+            ([700, 421], 4, 17 * 421)
+        );
+        let mut files = BTreeMap::new();
+        tree(&options.output, "", &mut files);
+        files
+    });
+    assert!(trees[0] == trees[1]);
+    assert!(trees[0].len() > 6);
+}
+
+#[test]
+fn an_interrupted_build_is_gone_on_with_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let field = Field::new(300, 421, hills);
+    let source = crate::pyramid::SourceMetadata {
+        name: "hills".into(),
+        bytes: 1,
+        blake3: "00".into(),
+    };
+    let options = |name: &str| BuildOptions {
+        sources: vec![source.clone()],
+        ..options(folder.path(), name, 2)
+    };
+    run(&field, &options("whole")).unwrap();
+    let cancel = AtomicBool::new(false);
+    let stop = |progress: Progress| {
+        if progress.stage == Stage::Write && progress.done == 1 {
+            cancel.store(true, std::sync::atomic::Ordering::Relaxed);
+        }
+    };
+    let stopped = build(&field, None, &options("resumed"), &stop, &cancel);
+    assert!(matches!(stopped, Err(PyramidError::Interrupted)));
+    assert!(!options("resumed").output.exists());
+    run(&field, &options("resumed")).unwrap();
+    let [mut whole, mut resumed] = [BTreeMap::new(), BTreeMap::new()];
+    tree(&options("whole").output, "", &mut whole);
+    tree(&options("resumed").output, "", &mut resumed);
+    assert!(whole == resumed);
+}
+
+#[test]
+fn real_ground_is_within_the_bound() {
+    for (path, eps) in [
+        ("data/dem/mt_rainier_90m.tif", Some(2.0)),
+        ("data/dem/dem_SouthGlacier.tif", None),
+    ] {
+        let Some(path) = shared(path) else { return };
+        let raster = dem::open(&path, &OpenOptions::default()).unwrap();
+        let built = built(raster.as_ref(), eps);
+        built.check_bound(raster.as_ref());
+        built.check_borders();
+    }
+}

@@ -1,0 +1,64 @@
+//! Files that are whole or not there.
+
+use std::{
+    fs::{self, File},
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+use super::PyramidError;
+
+/// The path with something added to its last name.
+pub(super) fn sibling(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_os_string();
+    name.push(suffix);
+    path.with_file_name(name)
+}
+
+/// Writes a file so that it is whole or not there, on the disk and not only in the cache.
+pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PyramidError> {
+    write_whole_with(path, |file| file.write_all(bytes))
+}
+
+/// As [`write_whole`], for bytes that are written in pieces.
+pub(super) fn write_whole_with(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> std::io::Result<()>,
+) -> Result<(), PyramidError> {
+    let partial = sibling(path, ".partial");
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(PyramidError::io("creating", folder))?;
+    let written = File::options()
+        .read(true)
+        .write(true)
+        .create(true)
+        .truncate(true)
+        .open(&partial)
+        .and_then(|mut file| write(&mut file).and_then(|()| file.sync_all()));
+    if let Err(error) = written {
+        // What is left of it is in the way of nothing; the first error is the one to tell.
+        let _ = fs::remove_file(&partial);
+        return Err(PyramidError::io("writing", path)(error));
+    }
+    fs::rename(&partial, path).map_err(PyramidError::io("renaming", &partial))?;
+    sync_folder(folder)
+}
+
+/// Brings a folder's names to the disk.
+#[cfg(unix)]
+pub(super) fn sync_folder(folder: &Path) -> Result<(), PyramidError> {
+    let folder = if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    };
+    File::open(folder)
+        .and_then(|file| file.sync_all())
+        .map_err(PyramidError::io("flushing", folder))
+}
+
+/// Folders cannot be flushed here.
+#[cfg(not(unix))]
+pub(super) fn sync_folder(_: &Path) -> Result<(), PyramidError> {
+    Ok(())
+}

@@ -1,0 +1,90 @@
+//! A folder, read with positioned reads: a file that is cut short at any moment is an error.
+
+use std::{
+    fs::File,
+    num::NonZero,
+    ops::Range,
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex, PoisonError},
+};
+
+use lru::LruCache;
+
+use super::{Store, StoreError, checked_length};
+
+/// Files kept open: well under what systems allow a process.
+const OPEN_FILES: NonZero<usize> = NonZero::new(64).unwrap();
+
+/// A pyramid's folder, read with `pread`.
+#[derive(Debug)]
+pub struct FileStore {
+    folder: PathBuf,
+    open: Mutex<LruCache<String, Arc<File>>>,
+}
+
+impl FileStore {
+    /// The files under a folder.
+    #[must_use]
+    pub fn new(folder: impl Into<PathBuf>) -> Self {
+        Self {
+            folder: folder.into(),
+            open: Mutex::new(LruCache::new(OPEN_FILES)),
+        }
+    }
+
+    /// The path of a key.
+    #[must_use]
+    pub fn path(&self, key: &str) -> PathBuf {
+        self.folder.join(key)
+    }
+
+    fn file(&self, key: &str) -> std::io::Result<Arc<File>> {
+        let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(file) = open.get(key) {
+            return Ok(file.clone());
+        }
+        let file = Arc::new(File::open(self.path(key))?);
+        open.put(key.to_owned(), file.clone());
+        Ok(file)
+    }
+}
+
+impl Store for FileStore {
+    fn read(&self, key: &str, range: Range<u64>) -> Result<Vec<u8>, StoreError> {
+        let wrap = |error| StoreError::io(&self.name(key), error);
+        let file = self.file(key).map_err(wrap)?;
+        let bytes = file.metadata().map_err(wrap)?.len();
+        let mut buffer = vec![0; checked_length(|| self.name(key), &range, bytes)?];
+        read_at(&file, &mut buffer, range.start).map_err(wrap)?;
+        Ok(buffer)
+    }
+
+    fn size(&self, key: &str) -> Result<u64, StoreError> {
+        let metadata = Path::metadata(&self.path(key));
+        Ok(metadata
+            .map_err(|error| StoreError::io(&self.name(key), error))?
+            .len())
+    }
+
+    fn name(&self, key: &str) -> String {
+        self.path(key).display().to_string()
+    }
+}
+
+#[cfg(unix)]
+fn read_at(file: &File, buffer: &mut [u8], offset: u64) -> std::io::Result<()> {
+    std::os::unix::fs::FileExt::read_exact_at(file, buffer, offset)
+}
+
+#[cfg(windows)]
+fn read_at(file: &File, mut buffer: &mut [u8], mut offset: u64) -> std::io::Result<()> {
+    while !buffer.is_empty() {
+        let count = std::os::windows::fs::FileExt::seek_read(file, buffer, offset)?;
+        if count == 0 {
+            return Err(std::io::ErrorKind::UnexpectedEof.into());
+        }
+        buffer = &mut buffer[count..];
+        offset += count as u64;
+    }
+    Ok(())
+}

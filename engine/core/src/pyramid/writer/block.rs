@@ -1,0 +1,76 @@
+//! The chunks of one shard, made in parallel and written in order.
+
+use std::{
+    fs::File,
+    io::{Seek, SeekFrom, Write},
+};
+
+use rayon::prelude::*;
+
+use crate::{
+    geo::TileId,
+    pyramid::shard::{SHARD_TILES, ShardIndex, encode_image, encode_record, shard_shape, z_order},
+};
+
+/// Chunks in memory at once, for each of which a record is made.
+const BATCH: usize = 64;
+
+/// What a tile's chunk holds, before it is compressed; none for a tile that is absent.
+pub(super) type Contents<'a> = &'a (dyn Fn(TileId) -> Option<Vec<u8>> + Sync);
+
+/// What one shard holds.
+pub(super) struct Block {
+    pub(super) level: u8,
+    pub(super) tiles: [u32; 2],
+    pub(super) shard: [u32; 2],
+    pub(super) chunk_bytes: usize,
+    /// Lengths of a record's parts; none for imagery.
+    pub(super) sections: Vec<usize>,
+}
+
+impl Block {
+    /// Writes chunks after the place of the index, then the index; returns how many chunks there are.
+    pub(super) fn write(&self, file: &mut File, contents: Contents<'_>) -> std::io::Result<u32> {
+        let shape = shard_shape(self.tiles);
+        let mut index = ShardIndex::new(shape);
+        let mut offset = ShardIndex::byte_count(shape) as u64;
+        file.seek(SeekFrom::Start(offset))?;
+        for slots in z_order(shape).chunks(BATCH) {
+            let chunks: Vec<_> = slots
+                .par_iter()
+                .map(|&slot| self.chunk(slot, contents))
+                .collect();
+            for (&slot, chunk) in slots.iter().zip(chunks) {
+                let Some(chunk) = chunk? else { continue };
+                file.write_all(&chunk)?;
+                index.set(slot, offset..offset + chunk.len() as u64);
+                offset += chunk.len() as u64;
+            }
+        }
+        file.rewind()?;
+        file.write_all(&index.encode())?;
+        Ok(u32::try_from(index.chunk_count()).unwrap_or(u32::MAX))
+    }
+
+    fn chunk(&self, slot: [u32; 2], contents: Contents<'_>) -> std::io::Result<Option<Vec<u8>>> {
+        let [row, column] = [0, 1].map(|axis| self.shard[axis] * SHARD_TILES + slot[axis]);
+        if row >= self.tiles[0] || column >= self.tiles[1] {
+            return Ok(None);
+        }
+        let Some(bytes) = contents(TileId::new(self.level, row, column)) else {
+            return Ok(None);
+        };
+        assert_eq!(
+            bytes.len(),
+            self.chunk_bytes,
+            "bytes of a chunk of level {}",
+            self.level
+        );
+        let chunk = if self.sections.is_empty() {
+            encode_image(&bytes)
+        } else {
+            encode_record(&bytes, &self.sections)
+        };
+        chunk.map(Some)
+    }
+}
