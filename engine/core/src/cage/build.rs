@@ -4,115 +4,15 @@
 //! 2. edges are numbered by their first half-edge;
 //! 3. rings are walked from twin to twin.
 
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "vertices and corners are checked to be fewer than 2^32 before they are numbered"
+)]
+
 use super::error::CageError;
+use super::faces::{Faces, Tags};
+use super::sharpness::{set_holes, set_sharpness};
 use super::topology::{NONE, Topology};
-use crate::subdiv::stored_sharpness;
-
-/// Faces of a mesh: for each its vertices, counter-clockwise seen from outside.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Faces {
-    offsets: Vec<u32>,
-    vertices: Vec<u32>,
-}
-
-impl Faces {
-    /// Of sizes known beforehand: face `f` has `vertices[offsets[f]..offsets[f + 1]]`. `None` unless offsets start at
-    /// 0, never fall, and end at the number of vertices.
-    #[must_use]
-    pub fn new(offsets: Vec<u32>, vertices: Vec<u32>) -> Option<Self> {
-        let fits = offsets.first() == Some(&0)
-            && offsets.is_sorted()
-            && offsets.last().map(|&last| last as usize) == Some(vertices.len());
-        fits.then_some(Self { offsets, vertices })
-    }
-
-    /// Quads only.
-    #[must_use]
-    pub fn quads(quads: &[[u32; 4]]) -> Self {
-        quads.iter().collect()
-    }
-
-    /// Adds a face.
-    pub fn push(&mut self, face: &[u32]) {
-        if self.offsets.is_empty() {
-            self.offsets.push(0);
-        }
-        self.vertices.extend_from_slice(face);
-        self.offsets.push(self.vertices.len() as u32);
-    }
-
-    /// Number of faces.
-    #[must_use]
-    pub fn count(&self) -> u32 {
-        self.offsets.len().saturating_sub(1) as u32
-    }
-
-    /// Where a face's vertices are in [`Faces::list`].
-    #[must_use]
-    #[inline]
-    pub fn corners(&self, face: u32) -> std::ops::Range<usize> {
-        self.offsets[face as usize] as usize..self.offsets[face as usize + 1] as usize
-    }
-
-    /// A face's vertices.
-    #[must_use]
-    #[inline]
-    pub fn vertices(&self, face: u32) -> &[u32] {
-        &self.vertices[self.corners(face)]
-    }
-
-    /// All faces' vertices, one face after the other.
-    #[must_use]
-    pub fn list(&self) -> &[u32] {
-        &self.vertices
-    }
-
-    /// All faces in order.
-    pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
-        self.offsets
-            .windows(2)
-            .map(|ends| &self.vertices[ends[0] as usize..ends[1] as usize])
-    }
-}
-
-impl<T: AsRef<[u32]>> FromIterator<T> for Faces {
-    fn from_iter<I: IntoIterator<Item = T>>(faces: I) -> Self {
-        let mut all = Self::default();
-        for face in faces {
-            all.push(face.as_ref());
-        }
-        all
-    }
-}
-
-/// A sharp edge.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Crease {
-    /// Its ends.
-    pub vertices: [u32; 2],
-    /// 0 smooth, 10 and more infinite.
-    pub sharpness: f64,
-}
-
-/// A sharp vertex.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Corner {
-    /// The vertex.
-    pub vertex: u32,
-    /// 0 smooth, 10 and more infinite.
-    pub sharpness: f64,
-}
-
-/// What is special about a cage. Of two tags on one thing the later holds; boundaries are infinitely sharp anyhow.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Tags {
-    /// Sharp edges.
-    pub creases: Vec<Crease>,
-    /// Sharp vertices.
-    pub corners: Vec<Corner>,
-    /// Faces that are subdivided but not part of the surface.
-    pub holes: Vec<u32>,
-}
 
 /// Coordinates larger than this could overflow when a normal is formed.
 const LARGEST_COORDINATE: f64 = 1e150;
@@ -477,86 +377,4 @@ fn second_fan(topology: &Topology, vertex: u32, ring_corners: &[u32]) -> u32 {
         .map(|(corner, _)| corner)
         .find(|corner| !met.contains(corner));
     topology.corner_face(missed.unwrap_or(met[0]))
-}
-
-fn set_sharpness(topology: &mut Topology, tags: &Tags) -> Result<(), CageError> {
-    topology.edge_sharpness = vec![0.0; topology.edge_vertices.len()];
-    topology.vertex_sharpness = vec![0.0; topology.vertex_count as usize];
-    for crease in &tags.creases {
-        let edge = tagged_edge(topology, crease)?;
-        topology.edge_sharpness[edge as usize] = stored_sharpness(crease.sharpness);
-    }
-    for corner in &tags.corners {
-        check_sharpness(corner.sharpness, || {
-            format!("the corner at vertex {}", corner.vertex)
-        })?;
-        let count = topology.vertex_count;
-        let slot = topology.vertex_sharpness.get_mut(corner.vertex as usize);
-        let missing = CageError::MissingTagged {
-            what: "vertex",
-            index: u64::from(corner.vertex),
-            count,
-        };
-        *slot.ok_or(missing)? = stored_sharpness(corner.sharpness);
-    }
-    sharpen_boundaries(topology);
-    Ok(())
-}
-
-fn tagged_edge(topology: &Topology, crease: &Crease) -> Result<u32, CageError> {
-    let [a, b] = crease.vertices;
-    check_sharpness(crease.sharpness, || {
-        format!("the crease from vertex {a} to vertex {b}")
-    })?;
-    let count = topology.vertex_count;
-    if let Some(&vertex) = crease.vertices.iter().find(|&&vertex| vertex >= count) {
-        return Err(CageError::MissingTagged {
-            what: "vertex",
-            index: u64::from(vertex),
-            count,
-        });
-    }
-    topology.edge_between(a, b).ok_or(CageError::MissingEdge {
-        vertices: [a, b].map(u64::from),
-    })
-}
-
-fn check_sharpness(sharpness: f64, what: impl FnOnce() -> String) -> Result<(), CageError> {
-    // A NaN is not at least 0 either.
-    if sharpness >= 0.0 {
-        Ok(())
-    } else {
-        Err(CageError::Sharpness {
-            what: what(),
-            sharpness,
-        })
-    }
-}
-
-/// Edge and corner: boundary edges are infinitely sharp, boundary vertices of one face are corners.
-fn sharpen_boundaries(topology: &mut Topology) {
-    for (sharpness, faces) in topology.edge_sharpness.iter_mut().zip(&topology.edge_faces) {
-        if faces[1] == NONE {
-            *sharpness = f64::INFINITY;
-        }
-    }
-    for vertex in 0..topology.vertex_count {
-        if topology.vertex_corners(vertex).len() == 1 {
-            topology.vertex_sharpness[vertex as usize] = f64::INFINITY;
-        }
-    }
-}
-
-fn set_holes(topology: &mut Topology, holes: &[u32]) -> Result<(), CageError> {
-    let count = topology.face_count();
-    for &face in holes {
-        topology.holes.resize(count as usize, false);
-        let missing = CageError::MissingTagged {
-            what: "face",
-            index: u64::from(face),
-            count,
-        };
-        *topology.holes.get_mut(face as usize).ok_or(missing)? = true;
-    }
-    Ok(())
 }

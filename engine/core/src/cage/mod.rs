@@ -3,20 +3,27 @@
 //! On the route between authored files and `fas` (tables): checks what it is given once, so that nothing below has to.
 //! Knows no table, no tile, no terrain and no file system; OBJ comes and goes as text.
 //!
-//! What is here: [`Cage`] and its [`Topology`], OBJ reading and writing, [`refine`] (plain uniform subdivision, the
-//! oracle of all tables).
+//! What is here: [`Cage`] and its [`Topology`], [`read_obj`] and [`write_obj`], [`refine`] (plain uniform subdivision,
+//! the oracle of all tables), [`LimitSurface`] (the exact surface, at any place) and [`CageInfo`] (what a cage holds).
 
 mod build;
 mod error;
+mod faces;
+mod info;
 mod limit;
 mod obj;
+mod sharpness;
 mod topology;
 mod uniform;
 
-pub use build::{Corner, Crease, Faces, Tags};
 pub use error::CageError;
+pub use faces::{Corner, Crease, Faces, Tags};
 
-pub use limit::{LimitSample, LimitSurface, Place};
+pub use info::CageInfo;
+pub use limit::{LimitPattern, LimitSample, LimitSurface, Place};
 pub use obj::{CageBudget, read_obj, write_obj};
 pub use topology::{Cage, NONE, Topology};
 pub use uniform::refine;
+
+#[cfg(test)]
+mod tests;

@@ -11,10 +11,15 @@
 //! The three numbers after a tag's name count its integers, its floats and its strings. Everything else in the file
 //! (texture coordinates, normals, groups, materials, other tags) is passed over.
 
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "the count of vertices was checked to fit 32 bits"
+)]
+
 use std::fmt::{self, Write};
 
-use super::build::{Corner, Crease, Faces, Tags};
 use super::error::CageError;
+use super::faces::{Corner, Crease, Faces, Tags};
 use super::topology::Cage;
 
 /// The most a reader takes in.

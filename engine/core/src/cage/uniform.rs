@@ -10,8 +10,13 @@
 //!
 //! with V vertices and E edges of the parent.
 
-use super::build::{Corner, Crease, Faces, Tags};
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "a linked cage numbers everything in 32 bits"
+)]
+
 use super::error::CageError;
+use super::faces::{Corner, Crease, Faces, Tags};
 use super::topology::{Cage, NONE, Topology};
 use crate::subdiv::{child_sharpness, edge_mask, vertex_mask};
 

@@ -1,5 +1,7 @@
 //! Places on the faces of a mixed cage, as places on the quads of its refinement.
 
+use std::ops::Range;
+
 use super::split::corner_towards;
 use super::{LimitSample, Place};
 
@@ -19,9 +21,28 @@ impl Turn {
     }
 }
 
-/// The refined face of a quad that holds a place: its corner, the place there and the turn back. Every child has its
-/// own (0, 0) at the parent's corner, so it is turned by as many quarters.
-pub(super) fn quarter(place: Place) -> (usize, Place, Turn) {
+/// The largest u of a face: one for each sub-face, of which a quad has only itself.
+pub(super) fn widest(size: usize) -> f64 {
+    if size == 4 { 1.0 } else { size as f64 }
+}
+
+/// The refined face that holds a place of a face with these corners, and the turn back.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a linked cage numbers its corners in 32 bits"
+)]
+pub(super) fn child_place(place: Place, corners: Range<usize>) -> (Place, Turn) {
+    let (corner, u, v, turn) = if corners.len() == 4 {
+        quarter(place)
+    } else {
+        sub_face(place, corners.len())
+    };
+    let face = (corners.start + corner) as u32;
+    (Place { face, u, v }, turn)
+}
+
+/// Every child has its own (0, 0) at the parent's corner, so it is turned by as many quarters.
+fn quarter(place: Place) -> (usize, f64, f64, Turn) {
     let (u, v) = (2.0 * place.u, 2.0 * place.v);
     let (from_right, from_top) = (2.0 - u, 2.0 - v);
     let corner = corner_towards(place.u, place.v);
@@ -31,16 +52,21 @@ pub(super) fn quarter(place: Place) -> (usize, Place, Turn) {
         2 => (from_right, from_top, [-2.0, 0.0], [0.0, -2.0]),
         _ => (from_top, u, [0.0, 2.0], [-2.0, 0.0]),
     };
-    (corner, Place { u, v, ..place }, Turn { du, dv })
+    (corner, u, v, Turn { du, dv })
 }
 
-/// The sub-face of an n-gon that holds a place.
-pub(super) fn sub_face(place: Place, size: usize) -> (usize, Place, Turn) {
-    let corner = (place.u.floor() as usize).min(size - 1);
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "u was checked to be in 0..=size"
+)]
+fn sub_face(place: Place, size: usize) -> (usize, f64, f64, Turn) {
+    let corner = (place.u as usize).min(size - 1);
     let u = place.u - corner as f64;
     (
         corner,
-        Place { u, ..place },
+        u,
+        place.v,
         Turn {
             du: [1.0, 0.0],
             dv: [0.0, 1.0],

@@ -17,15 +17,17 @@
 
 mod faces;
 mod patch;
+mod pattern;
 mod power;
 mod regular;
 mod ring;
+mod shape;
 mod split;
 mod vertex;
 
 use glam::DVec3;
 
-use self::faces::{quarter, sub_face};
+use self::faces::{child_place, widest};
 use self::patch::Patch;
 use self::power::PowerPatch;
 use self::regular::RegularFaces;
@@ -33,6 +35,8 @@ use self::split::{Scratch, sample};
 use super::error::CageError;
 use super::topology::Cage;
 use super::uniform::refine;
+
+pub use self::pattern::LimitPattern;
 
 /// A place on the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -191,26 +195,11 @@ impl<'a> LimitSurface<'a> {
     fn evaluate_with(&self, place: Place, scratch: &mut Scratch) -> Result<LimitSample, CageError> {
         self.check_face(place)?;
         let corners = self.cage.topology().face_corners(place.face);
-        self.check_parameters(
-            &place,
-            if corners.len() == 4 {
-                1.0
-            } else {
-                corners.len() as f64
-            },
-        )?;
+        self.check_parameters(&place, widest(corners.len()))?;
         let Some(quads) = &self.quads else {
             return Ok(scratch.evaluate(&self.regular, self.cage, place));
         };
-        let (corner, child, turn) = if corners.len() == 4 {
-            quarter(place)
-        } else {
-            sub_face(place, corners.len())
-        };
-        let child = Place {
-            face: (corners.start + corner) as u32,
-            ..child
-        };
+        let (child, turn) = child_place(place, corners);
         let sample = scratch.evaluate(&self.regular, quads, child);
         Ok(LimitSample {
             du: turn.du(&sample),

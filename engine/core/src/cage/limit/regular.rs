@@ -1,5 +1,10 @@
 //! Regular faces: sixteen control numbers each, found once, so that evaluating them looks at no neighbour.
 
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "a linked cage numbers everything in 32 bits"
+)]
+
 use glam::DVec3;
 
 use super::super::topology::Topology;

@@ -11,6 +11,11 @@
 //!    0 ── m0 ── 1      (all modulo 4), so u and v keep their directions
 //! ```
 
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "a linked cage numbers everything in 32 bits"
+)]
+
 use glam::DVec3;
 
 use super::super::topology::Cage;

@@ -32,6 +32,12 @@ impl Scratch {
         }
     }
 
+    /// Takes a neighbourhood that is no face's.
+    pub(super) fn fill(&mut self, fill: impl FnOnce(&mut Neighbourhood)) {
+        self.face = None;
+        fill(&mut self.whole);
+    }
+
     /// The patch of a face that is one.
     pub(super) fn patch(
         &mut self,
@@ -65,7 +71,7 @@ impl Scratch {
     }
 
     /// Splits the face's neighbourhood towards (u, v) until the surface there is known.
-    fn split_to(&mut self, mut u: f64, mut v: f64) -> LimitSample {
+    pub(super) fn split_to(&mut self, mut u: f64, mut v: f64) -> LimitSample {
         let mut scale = 1.0;
         let mut depth = 0;
         loop {
@@ -135,6 +141,7 @@ fn vertex_sample(limit: VertexLimit, q: usize, origin: DVec3, scale: f64) -> Lim
     }
 }
 
+#[inline]
 pub(super) fn sample(jet: Jet, origin: DVec3, scale: f64) -> LimitSample {
     LimitSample {
         position: (origin + jet.position).to_array(),

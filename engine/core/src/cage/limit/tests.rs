@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::super::{
-    Cage, CageBudget, CageError, LimitSample, LimitSurface, Place, read_obj, refine,
+    Cage, CageBudget, CageError, LimitPattern, LimitSample, LimitSurface, Place, read_obj, refine,
 };
 
 fn repository() -> PathBuf {
@@ -144,7 +144,7 @@ fn refining_a_cage_does_not_change_its_surface() {
     for face in (0..cage.topology().face_count())
         .filter(|&face| cage.topology().face_vertices(face).len() == 4)
     {
-        let first = cage.topology().face_corners(face).start as u32;
+        let first = u32::try_from(cage.topology().face_corners(face).start).unwrap();
         for (u, v) in [(0.1, 0.3), (0.0, 0.01), (0.25, 0.0), (0.5, 0.5)] {
             let (whole, quarter) = (
                 surface.evaluate(face, u, v).unwrap(),
@@ -340,4 +340,43 @@ fn places_that_are_not_there_are_errors() {
         );
     }
     assert!(surface.evaluate(3, 3.0, 1.0).is_ok());
+}
+
+#[test]
+fn a_pattern_gives_what_single_places_give() {
+    let places = [
+        [0.5, 0.5],
+        [0.1, 0.7],
+        [0.01, 0.02],
+        [0.99, 0.0],
+        [0.3, 1.0],
+        [0.0, 0.0],
+        [1.0, 1.0],
+    ];
+    let folder = repository().join("tests/vectors/catmull-clark");
+    let mixed = refine(&parse(MIXED)).unwrap();
+    let named =
+        ["discs_3_5_7_10", "box_creases"].map(|name| read(&folder.join(format!("{name}.obj"))));
+    for cage in named.iter().chain([&mixed, &disc(60, 0.0)]) {
+        let pattern = LimitPattern::new(cage.topology(), &places).unwrap();
+        let surface = LimitSurface::new(cage).unwrap();
+        let (samples, positions) = (
+            pattern.samples(cage.positions()),
+            pattern.positions(cage.positions()),
+        );
+        let faces = 0..cage.topology().face_count();
+        let expected = faces.flat_map(|face| places.map(|[u, v]| Place { face, u, v }));
+        for ((place, sample), position) in expected.zip(samples).zip(positions) {
+            let exact = surface.evaluate(place.face, place.u, place.v).unwrap();
+            assert!(
+                distance(sample.position, exact.position) < 1e-13,
+                "{place:?}"
+            );
+            assert!(distance(position, exact.position) < 1e-13, "{place:?}");
+            // Deep places have weights of alternating sign and the size of 2^depth.
+            let scale = 1.0 + length(exact.du).max(length(exact.dv));
+            let off = distance(sample.du, exact.du).max(distance(sample.dv, exact.dv));
+            assert!(off < 1e-11 * scale, "{place:?}: {sample:?} {exact:?}");
+        }
+    }
 }
