@@ -1,2 +1,70 @@
-//! Placeholder.
-fn main() {}
+//! The `drumlin` command: elevation models in, pyramids out, and questions to pyramids.
+//!
+//! One verb, one file; the library does the work. Needs no GPU: `view` and `fly` run `drumlin-view`, which lives beside
+//! this program.
+
+mod arguments;
+mod build;
+mod height;
+mod info;
+mod interrupt;
+mod progress;
+mod sources;
+mod validate;
+mod viewer;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use drumlin_terminal::{
+    outcome::{EXIT_CODES, Outcome},
+    usage,
+};
+
+/// Large terrain: builds, inspects, checks and shows pyramids of elevation.
+#[derive(Debug, Parser)]
+#[command(name = "drumlin", version, after_help = EXIT_CODES, arg_required_else_help = true)]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Builds a pyramid from elevation models
+    #[command(after_help = EXIT_CODES)]
+    Build(build::Arguments),
+    /// Says what a pyramid holds
+    #[command(after_help = EXIT_CODES)]
+    Info(info::Arguments),
+    /// Checks a pyramid's files
+    #[command(after_help = EXIT_CODES)]
+    Validate(validate::Arguments),
+    /// Heights of places, of the surface as stored at the finest level
+    #[command(after_help = EXIT_CODES)]
+    Height(height::Arguments),
+    /// Opens a window on a pyramid (`drumlin-view view`)
+    #[command(disable_help_flag = true)]
+    View(viewer::Arguments),
+    /// Flies over a pyramid along a path and measures (`drumlin-view fly`)
+    #[command(disable_help_flag = true)]
+    Fly(viewer::Arguments),
+}
+
+fn main() -> ExitCode {
+    let arguments: Arguments = match usage::parse(arguments::prepared(std::env::args_os())) {
+        Ok(arguments) => arguments,
+        Err(code) => return code,
+    };
+    let outcome = match arguments.verb {
+        Verb::Build(arguments) => build::run(&arguments),
+        Verb::Info(arguments) => info::run(&arguments),
+        Verb::Validate(arguments) => validate::run(&arguments),
+        Verb::Height(arguments) => height::run(&arguments),
+        Verb::View(arguments) => viewer::run("view", &arguments),
+        Verb::Fly(arguments) => viewer::run("fly", &arguments),
+    };
+    outcome
+        .unwrap_or_else(|error| Outcome::of_error("drumlin", &error, |_| None))
+        .exit_code()
+}

@@ -1,2 +1,43 @@
-//! Placeholder.
-fn main() {}
+//! `drumlin-view`: the viewer and the flythrough benchmark; `drumlin view` and `drumlin fly` run it.
+
+mod adapter;
+mod arguments;
+mod auto_path;
+mod camera;
+mod cameras;
+mod controls;
+mod depth_frames;
+mod frames;
+mod path;
+mod report;
+mod screen;
+
+use std::{error::Error, process::ExitCode};
+
+use drumlin::RenderError;
+use drumlin_terminal::{outcome::Outcome, usage};
+
+use crate::arguments::{Arguments, Verb};
+
+fn main() -> ExitCode {
+    let arguments: Arguments = match usage::parse(std::env::args_os()) {
+        Ok(arguments) => arguments,
+        Err(code) => return code,
+    };
+    let outcome = match arguments.verb {
+        Verb::Adapter => adapter::run(),
+        _ => todo!(),
+    };
+    outcome
+        .unwrap_or_else(|error| Outcome::of_error("drumlin-view", &error, kind))
+        .exit_code()
+}
+
+/// What kind of wrong the renderer's errors are.
+fn kind(error: &(dyn Error + 'static)) -> Option<Outcome> {
+    Some(match error.downcast_ref::<RenderError>()? {
+        RenderError::Pyramid(error) => Outcome::of_pyramid(error),
+        RenderError::BudgetTooSmall { .. } => Outcome::Usage,
+        _ => Outcome::InvalidData,
+    })
+}

@@ -1,0 +1,207 @@
+//! `drumlin build`: elevation models become a pyramid.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use clap::Args;
+use drumlin_core::{
+    dem::{self, DemError, Image, Mosaic, OpenOptions, Raster},
+    geo::CrsKind,
+    pyramid::{
+        PyramidError, VerticalReference,
+        build::{BuildOptions, BuildReport, Imagery, build},
+    },
+};
+use drumlin_terminal::{outcome::Outcome, print, size};
+use serde_json::{Value, json};
+
+use crate::{interrupt, progress::Progress, sources};
+
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// GeoTIFF, SRTM .hgt, 16-bit PNG or EXR; where several overlap, the later one wins
+    #[arg(value_name = "INPUT", required = true)]
+    inputs: Vec<PathBuf>,
+    /// The pyramid to make: a folder, which appears when it is whole
+    #[arg(short, long, value_name = "OUT.zarr")]
+    output: PathBuf,
+    /// Greatest error of the finest level in metres [default: the largest that gives whole metres back exactly; 0.1
+    /// for other heights]
+    #[arg(long, value_name = "METRES")]
+    eps: Option<f64>,
+    /// Height unit in metres, a power of two [default: the largest that is at most an eighth of eps]
+    #[arg(long, value_name = "METRES")]
+    unit: Option<f64>,
+    /// Threads [default: all cores]; the result does not depend on it
+    #[arg(short = 'j', long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+    /// Memory the build may take, as 512MiB or 4GB; refused beforehand where that is too little
+    #[arg(long, value_name = "BYTES", value_parser = size::parse)]
+    memory_budget: Option<u64>,
+    /// CRS units from sample to sample, for files that do not say where they lie
+    #[arg(long, value_name = "UNITS")]
+    spacing: Option<f64>,
+    /// Metres a unit of the stored numbers
+    #[arg(long, value_name = "METRES")]
+    scale: Option<f64>,
+    /// A picture to lay over the terrain (PNG, JPEG, TIFF): of the same CRS, or of none and then stretched
+    #[arg(long, value_name = "IMG")]
+    imagery: Option<PathBuf>,
+    /// Zero of the heights, where known
+    #[arg(long, value_enum, default_value_t = Vertical::Unknown)]
+    vertical: Vertical,
+    /// Replaces a pyramid that is there; never anything else
+    #[arg(long)]
+    overwrite: bool,
+    /// A summary for programs on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Vertical {
+    Ellipsoidal,
+    Orthometric,
+    Unknown,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
+    let cancel = interrupt::flag()?;
+    let raster = open(arguments)?;
+    let image = arguments
+        .imagery
+        .as_deref()
+        .map(|file| open_imagery(file, &*raster))
+        .transpose()?;
+    let imagery = match (&image, &arguments.imagery) {
+        (Some(image), Some(file)) => Some(Imagery {
+            image,
+            sources: vec![sources::describe(file)?],
+        }),
+        _ => None,
+    };
+    let options = options(arguments)?;
+    let progress = Progress::new();
+    let tell = |step: drumlin_core::pyramid::build::Progress| {
+        progress.tell(step.stage.label(), step.done, step.total)
+    };
+    let report = build(&*raster, imagery.as_ref(), &options, &tell, &cancel)?;
+    drop(progress);
+    let text = if arguments.json {
+        format!("{:#}\n", json(arguments, &report)?)
+    } else {
+        lines(arguments, &report)
+    };
+    print(&text)?;
+    Ok(Outcome::Done)
+}
+
+fn options(arguments: &Arguments) -> Result<BuildOptions> {
+    let sources: Result<Vec<_>> = arguments
+        .inputs
+        .iter()
+        .map(|file| sources::describe(file))
+        .collect();
+    Ok(BuildOptions {
+        output: arguments.output.clone(),
+        overwrite: arguments.overwrite,
+        eps: arguments.eps,
+        unit: arguments.unit,
+        threads: arguments.jobs.map(usize::from),
+        memory_budget: arguments.memory_budget,
+        vertical: match arguments.vertical {
+            Vertical::Ellipsoidal => VerticalReference::Ellipsoidal,
+            Vertical::Orthometric => VerticalReference::Orthometric,
+            Vertical::Unknown => VerticalReference::Unknown,
+        },
+        sources: sources?,
+    })
+}
+
+/// Opens the inputs, as a mosaic where there are several.
+fn open(arguments: &Arguments) -> Result<Box<dyn Raster>> {
+    let options = OpenOptions {
+        spacing: arguments.spacing,
+        scale: arguments.scale,
+        ..OpenOptions::default()
+    };
+    let mut rasters = Vec::new();
+    for file in &arguments.inputs {
+        let raster = dem::open(file, &options)?;
+        let header = raster.header();
+        if header.crs.kind == CrsKind::Unknown {
+            let [x, y] = header.grid.step;
+            eprintln!(
+                "drumlin: {}: no coordinate system; taken as plane metres, {x} x {} a sample",
+                file.display(),
+                y.abs()
+            );
+        }
+        rasters.push(raster);
+    }
+    if rasters.len() > 1 {
+        return Ok(Box::new(Mosaic::new(rasters)?));
+    }
+    rasters
+        .pop()
+        .ok_or_else(|| PyramidError::Refused("no input".into()).into())
+}
+
+/// Reads the picture; one that says where it lies must say so in the terrain's CRS.
+fn open_imagery(file: &Path, raster: &dyn Raster) -> Result<Image> {
+    let image = dem::open_image(file)?;
+    let crs = &raster.header().crs;
+    let known = image.extent.is_some() && image.crs.kind != CrsKind::Unknown;
+    if known && !image.crs.same_as(crs) {
+        let what = format!(
+            "their coordinate systems are {} and {}",
+            crs.label(),
+            image.crs.label()
+        );
+        let first = raster.header().source.name.clone();
+        let second = file
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        return Err(DemError::Mismatch {
+            first,
+            second,
+            what,
+        }
+        .into());
+    }
+    Ok(image)
+}
+
+fn json(arguments: &Arguments, report: &BuildReport) -> Result<Value> {
+    let mut value = serde_json::to_value(report)?;
+    value["output"] = json!(arguments.output);
+    Ok(value)
+}
+
+fn lines(arguments: &Arguments, report: &BuildReport) -> String {
+    let [rows, columns] = report.samples;
+    let mut text = format!("{}\n", arguments.output.display());
+    text += &format!(
+        "  {columns} x {rows} samples, {} void\n",
+        report.void_samples
+    );
+    text += &format!(
+        "  {} levels, {} tiles, error at most {} m\n",
+        report.levels, report.tiles, report.eps
+    );
+    text += &format!(
+        "  {} of heights from {} of input",
+        size::display(report.height_bytes),
+        size::display(report.source_bytes)
+    );
+    if report.color_levels > 0 {
+        text += &format!(", {} of imagery", size::display(report.color_bytes));
+    }
+    let samples = f64::from(rows) * f64::from(columns) / report.seconds.max(1e-9) / 1e6;
+    text + &format!(
+        "\n  {:.1} s, {samples:.1} million samples a second\n",
+        report.seconds
+    )
+}
