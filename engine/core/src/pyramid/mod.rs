@@ -4,6 +4,7 @@
 
 pub mod build;
 mod error;
+pub mod feature;
 mod files;
 mod metadata;
 mod patch_code;

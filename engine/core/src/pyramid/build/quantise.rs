@@ -112,8 +112,11 @@ pub(super) fn quantise(
 
 /// `difference / step` rounded to nearest.
 fn nearest(difference: i32, step: i32) -> i32 {
-    static DEAD: std::sync::LazyLock<i32> = std::sync::LazyLock::new(|| std::env::var("DEAD").map_or(50, |v| v.parse().unwrap()));
-    if difference.abs() * 100 <= step * *DEAD { return 0; }
+    static DEAD: std::sync::LazyLock<i32> =
+        std::sync::LazyLock::new(|| std::env::var("DEAD").map_or(50, |v| v.parse().unwrap()));
+    if difference.abs() * 100 <= step * *DEAD {
+        return 0;
+    }
     (difference + step / 2).div_euclid(step)
 }
 

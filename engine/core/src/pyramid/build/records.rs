@@ -152,7 +152,13 @@ fn patch_codes(errors: &TileErrors, tile_error: f32, unit: f64) -> Vec<u8> {
             4 if tile_error == 0.0 => 15,
             5 if tile_error == 0.0 => n.next_multiple_of(2).min(15),
             6 if tile_error == 0.0 => n.next_multiple_of(2).max(6).min(15),
-            7 if tile_error == 0.0 => if n <= 6 { 6 } else { n.next_multiple_of(3).min(15) },
+            7 if tile_error == 0.0 => {
+                if n <= 6 {
+                    6
+                } else {
+                    n.next_multiple_of(3).min(15)
+                }
+            }
             _ => n,
         }
     };
