@@ -24,7 +24,7 @@ mod tests;
 mod zipper;
 
 pub use lay::lay;
-pub(super) use record::{decode, encode};
+pub(in crate::pyramid) use record::{decode, encode};
 
 use serde::{Deserialize, Serialize};
 
@@ -146,7 +146,7 @@ fn cell(at: f64, count: u32) -> ([u32; 2], f64) {
 ///
 /// # Errors
 /// As [`lay`]; [`PyramidError::Refused`] where two cuts have a patch or a border in common.
-pub(super) fn lay_all(
+pub(in crate::pyramid) fn lay_all(
     inputs: &[FeatureInput],
     site: &Site<'_>,
 ) -> Result<Vec<LaidFeature>, PyramidError> {
@@ -183,7 +183,10 @@ pub(super) fn shown([row0, column0, row1, column1]: [u32; 4]) -> String {
 }
 
 /// The tiles a cut has patches of, row by row.
-pub(super) fn tiles_of(level: u8, [row0, column0, row1, column1]: [u32; 4]) -> Vec<TileId> {
+pub(in crate::pyramid) fn tiles_of(
+    level: u8,
+    [row0, column0, row1, column1]: [u32; 4],
+) -> Vec<TileId> {
     let quads = TILE_QUADS as u32;
     let span = |first: u32, end: u32| first / quads..end.saturating_sub(1) / quads + 1;
     span(row0, row1)

@@ -1,6 +1,6 @@
 //! Records of `feature/<L>`: what a tile's chunk says of the features that touch it. `FORMAT.md` draws the bytes.
 
-use super::{FeatureGroup, tiles_of};
+use super::{CUT_PATCH_LIMIT, FeatureGroup, tiles_of};
 use crate::cage::{Cage, Corner, Crease, Faces, Tags};
 use crate::geo::TileId;
 
@@ -147,6 +147,12 @@ impl Input<'_> {
         if level != u32::from(tile.level) || row0 >= row1 || column0 >= column1 {
             return Err(format!(
                 "feature {id} at level {level} with the cut {cut:?}"
+            ));
+        }
+        let [rows, columns] = [row1 - row0, column1 - column0].map(u64::from);
+        if rows * columns > CUT_PATCH_LIMIT {
+            return Err(format!(
+                "feature {id} with a cut of {rows} x {columns} patches; the limit is {CUT_PATCH_LIMIT}"
             ));
         }
         let home = TileId::new(tile.level, row, column);

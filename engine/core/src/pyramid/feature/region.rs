@@ -33,6 +33,7 @@ impl Region {
         }
         region.fill();
         region.grow();
+        region.fill();
         while region.part_corners() {
             region.fill();
         }
