@@ -1,3 +1,9 @@
 //! End-to-end tests, one binary.
 
+mod commands;
+mod flight;
+mod gpu_parity;
 mod layers;
+mod shared_structs;
+mod support;
+mod terrain;

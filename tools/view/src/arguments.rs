@@ -50,6 +50,12 @@ pub(crate) struct TerrainArguments {
     /// Draws whole tiles at stride 1, to compare with
     #[arg(long)]
     pub(crate) uniform_depth: bool,
+    /// Draws the edges of the triangles
+    #[arg(long)]
+    pub(crate) wireframe: bool,
+    /// Colours patches by their depth
+    #[arg(long)]
+    pub(crate) depth_colors: bool,
     /// Memory for tiles, as 256MiB or 2GB
     #[arg(long, value_name = "BYTES", default_value = "512MiB", value_parser = size::parse)]
     pub(crate) ram_budget: u64,

@@ -34,7 +34,7 @@ pub(crate) fn auto_path(
     let survey = Survey::new(extent, ground);
     // Narrow strips still get a round flight: past their sides, at the height of the ground inside.
     let reach = half.map(|half| half.max(0.3 * size));
-    let clearance = 0.06 * size + 0.35 * (survey.highest - survey.lowest);
+    let clearance = 0.1 * size + 0.3 * (survey.highest - survey.lowest);
     let middle = frame.to_world(extent.center());
     let summit = frame.to_world(survey.summit);
     let focus = [0, 1].map(|i| 0.5 * (middle[i] + summit[i]));
@@ -42,7 +42,7 @@ pub(crate) fn auto_path(
         .map(|index| {
             let part = f64::from(index) / f64::from(KEY_COUNT - 1);
             let (sin, cos) = (TAU * (0.9 * part + 0.5)).sin_cos();
-            let radius = 0.85 - 0.35 * (TAU * 0.5 * part).sin();
+            let radius = 0.9 - 0.35 * (TAU * 0.5 * part).sin();
             let eye = frame.to_crs([
                 middle[0] + radius * reach[0] * sin,
                 middle[1] + radius * reach[1] * cos,

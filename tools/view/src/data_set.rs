@@ -6,6 +6,8 @@ use anyhow::Result;
 use drumlin_core::{
     geo::{TILE_CELLS, TILE_SAMPLES, TileId, WorldFrame},
     pyramid::{Metadata, Pyramid, surface},
+    stream::TileSource,
+    terrain::PyramidSource,
 };
 use serde_json::{Value, json};
 
@@ -19,18 +21,25 @@ const GROUND_LEVEL: u8 = 2;
 
 /// An open pyramid.
 pub(crate) struct DataSet {
-    pub(crate) pyramid: Arc<Pyramid>,
+    pub(crate) source: Arc<PyramidSource>,
     name: String,
 }
 
 impl DataSet {
     pub(crate) fn open(folder: &FilePath) -> Result<Self> {
-        let name = folder.file_name().unwrap_or(folder.as_os_str()).to_string_lossy().into_owned();
-        Ok(Self { pyramid: Arc::new(Pyramid::open(folder)?), name })
+        let name = folder
+            .file_name()
+            .unwrap_or(folder.as_os_str())
+            .to_string_lossy()
+            .into_owned();
+        Ok(Self {
+            source: Arc::new(PyramidSource::open(folder)?),
+            name,
+        })
     }
 
     pub(crate) fn metadata(&self) -> &Metadata {
-        self.pyramid.metadata()
+        self.source.metadata()
     }
 
     pub(crate) fn frame(&self) -> WorldFrame {
@@ -49,8 +58,10 @@ impl DataSet {
         match file {
             Some(file) => path::read(file),
             None => {
-                let ground = Ground::read(&self.pyramid)?;
-                auto_path(&self.metadata().grid.extent(), &self.frame(), &|place| ground.height(place))
+                let ground = Ground::read(self.source.pyramid())?;
+                auto_path(&self.metadata().grid.extent(), &self.frame(), &|place| {
+                    ground.height(place)
+                })
             }
         }
     }
@@ -85,12 +96,18 @@ impl<'a> Ground<'a> {
         let level = metadata.finest().min(GROUND_LEVEL);
         let [rows, columns] = metadata.grid.tiles(level);
         let read = |index: u32| -> Result<Vec<f64>> {
-            let tile = pyramid.read_tile_chain(TileId::new(level, index / columns, index % columns))?;
+            let tile =
+                pyramid.read_tile_chain(TileId::new(level, index / columns, index % columns))?;
             let heights = surface::decode_heights(&tile.controls, &tile.detail, tile.step);
-            let metres = |height: i32| f64::from(height) * metadata.unit() + f64::from(tile.summary.error);
+            let metres =
+                |height: i32| f64::from(height) * metadata.unit() + f64::from(tile.summary.error);
             Ok(heights.into_iter().map(metres).collect())
         };
-        Ok(Self { metadata, level, tiles: (0..rows * columns).map(read).collect::<Result<_>>()? })
+        Ok(Self {
+            metadata,
+            level,
+            tiles: (0..rows * columns).map(read).collect::<Result<_>>()?,
+        })
     }
 
     /// The highest corner of the cell at CRS coordinates; none outside.
@@ -101,7 +118,8 @@ impl<'a> Ground<'a> {
         }
         let place = grid.at_level(self.level).row_column(place);
         let [tile_rows, tile_columns] = grid.tiles(self.level).map(|count| count as usize);
-        let [(tile_row, row), (tile_column, column)] = [(place[0], tile_rows), (place[1], tile_columns)].map(cell);
+        let [(tile_row, row), (tile_column, column)] =
+            [(place[0], tile_rows), (place[1], tile_columns)].map(cell);
         let heights = &self.tiles[tile_row * tile_columns + tile_column];
         let corner = row * TILE_SAMPLES + column;
         let corners = [0, 1, TILE_SAMPLES, TILE_SAMPLES + 1].map(|step| heights[corner + step]);
@@ -110,7 +128,10 @@ impl<'a> Ground<'a> {
 }
 
 /// The tile and the cell in it of a row or column with a fraction.
-#[expect(clippy::cast_possible_truncation, reason = "clamped to the level's cells")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "clamped to the level's cells"
+)]
 fn cell((at, tiles): (f64, usize)) -> (usize, usize) {
     let cell = (at.max(0.0) as usize).min(tiles * TILE_CELLS - 1);
     (cell / TILE_CELLS, cell % TILE_CELLS)

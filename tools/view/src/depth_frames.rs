@@ -13,15 +13,6 @@ pub(crate) fn file(folder: &Path, index: u32) -> PathBuf {
     folder.join(format!("depth_{index:05}.exr"))
 }
 
-/// Metres along the view axis from what a depth buffer with reversed Z and an infinite far plane holds: `near / z`.
-pub(crate) fn metres(reversed_z: f32, near: f32) -> f32 {
-    if reversed_z > 0.0 {
-        near / reversed_z
-    } else {
-        f32::INFINITY
-    }
-}
-
 /// Writes the metres of a frame, row by row from the top.
 pub(crate) fn write(file: &Path, [width, height]: [u32; 2], metres: &[f32]) -> Result<()> {
     let [width, height] = [width as usize, height as usize];
@@ -46,13 +37,6 @@ mod tests {
     use exr::prelude::{FlatSamples, ReadChannels, ReadLayers, read};
 
     use super::*;
-
-    #[test]
-    fn nothing_is_infinitely_far() {
-        assert_eq!(metres(0.0, 2.0), f32::INFINITY);
-        assert_eq!(metres(1.0, 2.0), 2.0);
-        assert_eq!(metres(0.5, 2.0), 4.0);
-    }
 
     #[test]
     fn depths_read_back_bit_by_bit() {

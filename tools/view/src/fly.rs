@@ -7,7 +7,7 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use drumlin::{Headless, Offscreen, wgpu};
+use drumlin::{Headless, Offscreen, Pace, View, wgpu};
 use drumlin_terminal::{outcome::Outcome, print};
 
 use crate::{
@@ -24,13 +24,14 @@ use crate::{
 };
 
 /// Frames after the last one in which its late numbers come back from the device.
-const LATE_FRAMES: usize = 3;
+const LATE_FRAMES: usize = 4;
 
 pub(crate) fn run(arguments: &FlyArguments) -> Result<Outcome> {
     let data = DataSet::open(&arguments.terrain.pyramid)?;
     let keys = data.keys(arguments.terrain.path.as_deref())?;
     if let Some(file) = &arguments.save_path {
-        std::fs::write(file, path::to_json(&keys)?).with_context(|| format!("{}: writing failed", file.display()))?;
+        std::fs::write(file, path::to_json(&keys)?)
+            .with_context(|| format!("{}: writing failed", file.display()))?;
     }
     let path = Path::new(&keys, &data.frame())?;
     let mut flight = Flight::new(arguments, &data, frame_count(&path, arguments.fps))?;
@@ -42,9 +43,20 @@ pub(crate) fn run(arguments: &FlyArguments) -> Result<Outcome> {
 }
 
 /// Frames of a whole path, its first and its last moment among them.
-#[expect(clippy::cast_possible_truncation, reason = "a flight of 2^32 frames is cut there")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a flight of 2^32 frames is cut there"
+)]
 fn frame_count(path: &Path, fps: f64) -> u32 {
     (path.seconds() * fps + 1e-6) as u32 + 1
+}
+
+fn pace(arguments: &FlyArguments) -> Pace {
+    match arguments.mode {
+        _ if arguments.wait_for_tiles => Pace::Complete,
+        Mode::Stepped => Pace::Stepped,
+        Mode::Paced => Pace::Paced,
+    }
 }
 
 /// A flight under way.
@@ -57,9 +69,10 @@ struct Flight<'a> {
     rows: Vec<FrameRow>,
     cameras: Cameras,
     pictures: Option<FrameWriter>,
-    /// Number of the terrain's frame that the first row is.
-    first_frame: u64,
+    /// The terrain's number of each row's frame, rising.
+    frame_numbers: Vec<u64>,
     bytes_read: u64,
+    last_view: Option<View>,
 }
 
 impl<'a> Flight<'a> {
@@ -68,16 +81,30 @@ impl<'a> Flight<'a> {
             make_folder(folder)?;
         }
         let Size(size) = arguments.terrain.size;
-        let wanted =
-            Wanted { frames: arguments.frames.clone(), contact_sheet: arguments.contact_sheet.clone() };
+        let wanted = Wanted {
+            frames: arguments.frames.clone(),
+            contact_sheet: arguments.contact_sheet.clone(),
+        };
         let headless = Headless::new()?;
         let (device, queue) = (&headless.device, &headless.queue);
-        let scene = Scene::open(data, device, queue, Offscreen::COLOR_FORMAT, &arguments.terrain, arguments.wait_for_tiles)?;
+        let scene = Scene::open(
+            data,
+            device,
+            queue,
+            Offscreen::COLOR_FORMAT,
+            &arguments.terrain,
+            pace(arguments),
+        )?;
         Ok(Self {
             offscreen: Offscreen::new(device, size),
-            pictures: if wanted.is_empty() { None } else { Some(FrameWriter::start(wanted, frame_count)?) },
-            first_frame: scene.frame_number() + 1,
+            pictures: if wanted.is_empty() {
+                None
+            } else {
+                Some(FrameWriter::start(wanted, frame_count)?)
+            },
+            frame_numbers: Vec::new(),
             bytes_read: 0,
+            last_view: None,
             arguments,
             headless,
             scene,
@@ -90,8 +117,10 @@ impl<'a> Flight<'a> {
     /// Every frame is 1 / fps later than the one before, however long it took.
     fn stepped(&mut self, path: &Path) -> Result<()> {
         for index in 0..self.frame_count {
-            self.frame(index, &path.camera(f64::from(index) / self.arguments.fps), f64::from(index) / self.arguments.fps)?;
-            self.collect_waiting()?;
+            let seconds = f64::from(index) / self.arguments.fps;
+            self.frame(index, &path.camera(seconds), seconds)?;
+            // Every frame's numbers then come back with one of the next updates.
+            self.headless.finish()?;
         }
         Ok(())
     }
@@ -106,9 +135,11 @@ impl<'a> Flight<'a> {
             let seconds = start.elapsed().as_secs_f64().min(path.seconds());
             self.frame(drawn, &path.camera(seconds), seconds)?;
             self.headless.device.poll(wgpu::PollType::Poll)?;
-            self.collect();
             drawn += 1;
-            #[expect(clippy::cast_possible_truncation, reason = "at most the number of frames")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "at most the number of frames"
+            )]
             let now = (start.elapsed().as_secs_f64() * self.arguments.fps) as u32;
             index = now.max(index) + 1;
         }
@@ -118,15 +149,132 @@ impl<'a> Flight<'a> {
     /// Draws one frame.
     fn frame(&mut self, index: u32, camera: &Camera, seconds: f64) -> Result<()> {
         let size = self.offscreen.size();
-        let view = Scene::view(camera, size, seconds);
+        let view = self.scene.view(camera, size, seconds);
+        self.last_view = Some(view);
         let start = Instant::now();
-        self.scene.update(&view, Debug::default());
+        self.scene.update(&view, Debug::of(&self.arguments.terrain));
         let updated = start.elapsed();
-        let mut encoder = self.encode();
-        self.headless.queue.submit([encoder_finish(&mut encoder)]);
+        self.collect();
+        let commands = self.encode();
         let encoded = start.elapsed();
-        self.push_row(seconds, [updated, encoded]);
+        self.headless.queue.submit([commands]);
+        self.add_row(seconds, [updated, encoded - updated, start.elapsed()]);
         self.cameras.push(camera, size);
         self.save(index)
     }
+
+    fn encode(&mut self) -> wgpu::CommandBuffer {
+        let Headless { device, queue, .. } = &self.headless;
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.scene.prepare(device, queue, &mut encoder);
+        let times = self.scene.pass_times();
+        let mut pass = self
+            .offscreen
+            .color_pass(&mut encoder, Scene::background(), times);
+        self.scene.draw(&mut pass);
+        drop(pass);
+        if self.arguments.depth_frames.is_some() {
+            self.scene
+                .draw_distances(&mut self.offscreen.distance_pass(&mut encoder));
+        }
+        encoder.finish()
+    }
+
+    fn add_row(&mut self, t: f64, [update, encode, total]: [Duration; 3]) {
+        let report = self.scene.report();
+        let stats = &report.stats;
+        let millis = |span: Duration| 1000.0 * span.as_secs_f64();
+        self.rows.push(FrameRow {
+            t,
+            cpu_update_millis: millis(update),
+            cpu_encode_millis: millis(encode),
+            cpu_total_millis: millis(total),
+            tiles_drawn: stats.tiles_drawn as u64,
+            tiles_missing: stats.tiles_missing as u64,
+            missing_share: stats.missing_share,
+            bytes_read: stats.bytes_read - self.bytes_read,
+            bytes_uploaded: stats.uploaded_bytes,
+            ram_bytes: stats.ram_bytes,
+            vram_bytes: report.vram_bytes,
+            error_px: stats.tolerance_px,
+            ..FrameRow::default()
+        });
+        self.bytes_read = stats.bytes_read;
+        self.frame_numbers.push(self.scene.frame_number());
+    }
+
+    /// Reads the pictures back, where they are wanted.
+    fn save(&mut self, index: u32) -> Result<()> {
+        let Headless { device, queue, .. } = &self.headless;
+        let size = self.offscreen.size();
+        if let Some(pictures) = &self.pictures {
+            pictures.write(index, size, self.offscreen.read_color(device, queue)?)?;
+        }
+        if let Some(folder) = &self.arguments.depth_frames {
+            let metres = self.offscreen.read_distance(device, queue)?;
+            depth_frames::write(&depth_frames::file(folder, index), size, &metres)?;
+        }
+        Ok(())
+    }
+
+    /// Puts numbers that have come back from the device into the rows of their frames.
+    fn collect(&mut self) {
+        let (counts, times) = (self.scene.report().counts, self.scene.report().gpu_times);
+        if let Some((counts, row)) =
+            counts.and_then(|counts| Some((counts, self.row(counts.frame)?)))
+        {
+            row.triangles = counts.triangles.into();
+            row.patches.regular = counts.regular_patches.map(u64::from);
+            row.patches.transition = counts.transition_patches.map(u64::from);
+        }
+        if let Some((times, row)) = times.and_then(|times| Some((times, self.row(times.frame)?))) {
+            row.gpu_millis = Some(times.stages_millis + times.pass_millis.unwrap_or(0.0));
+        }
+    }
+
+    /// The row of a frame of the terrain's.
+    fn row(&mut self, frame: u64) -> Option<&mut FrameRow> {
+        let index = self.frame_numbers.binary_search(&frame).ok()?;
+        self.rows.get_mut(index)
+    }
+
+    /// Waits for late numbers, and writes what was asked for.
+    fn finish(mut self, data: &DataSet) -> Result<Outcome> {
+        if let Some(view) = self.last_view {
+            for _ in 0..LATE_FRAMES {
+                self.headless.finish()?;
+                self.scene.update(&view, Debug::default());
+                self.collect();
+                let commands = self.encode();
+                self.headless.queue.submit([commands]);
+            }
+        }
+        if let Some(pictures) = self.pictures.take() {
+            pictures.finish()?;
+        }
+        if let Some(file) = &self.arguments.cameras {
+            self.cameras.write(file)?;
+        }
+        let report = Report::new(self.about(data)?, self.rows)?;
+        if let Some(file) = &self.arguments.report {
+            report.write(file)?;
+        }
+        print(&report.lines())?;
+        Ok(Outcome::Done)
+    }
+
+    fn about(&self, data: &DataSet) -> Result<About> {
+        Ok(About {
+            adapter: adapter::name(&self.headless.adapter),
+            driver: adapter::driver(&self.headless.adapter),
+            commit: env!("DRUMLIN_COMMIT"),
+            data_set: data.describe(),
+            settings: serde_json::to_value(self.arguments)?,
+        })
+    }
+}
+
+fn make_folder(folder: &FilePath) -> Result<()> {
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("{}: making it failed", folder.display()))
 }

@@ -6,11 +6,17 @@ mod auto_path;
 mod camera;
 mod cameras;
 mod controls;
+mod data_set;
 mod depth_frames;
+mod fly;
 mod frames;
 mod path;
 mod report;
+mod scene;
 mod screen;
+mod sky;
+mod view;
+mod viewer;
 
 use std::{error::Error, process::ExitCode};
 
@@ -26,7 +32,8 @@ fn main() -> ExitCode {
     };
     let outcome = match arguments.verb {
         Verb::Adapter => adapter::run(),
-        _ => todo!(),
+        Verb::Fly(arguments) => fly::run(&arguments),
+        Verb::View(arguments) => view::run(arguments),
     };
     outcome
         .unwrap_or_else(|error| Outcome::of_error("drumlin-view", &error, kind))

@@ -115,7 +115,8 @@ impl Path {
 
 /// Reads the keys of a path file.
 pub(crate) fn read(file: &FilePath) -> Result<Vec<Key>> {
-    let text = std::fs::read_to_string(file).with_context(|| format!("{}: reading failed", file.display()))?;
+    let text = std::fs::read_to_string(file)
+        .with_context(|| format!("{}: reading failed", file.display()))?;
     parse(&text).with_context(|| format!("{}: not a path", file.display()))
 }
 

@@ -129,7 +129,7 @@ impl Screen {
         let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("screenshot"),
             size: u64::from(pitch) * u64::from(height),
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });
         let mut encoder = self
@@ -146,7 +146,8 @@ impl Screen {
         };
         encoder.copy_texture_to_buffer(picture.as_image_copy(), into, picture.size());
         self.queue.submit([encoder.finish()]);
-        let bytes = drumlin::offscreen::read_buffer(&self.device, &buffer)?;
+        let bytes =
+            drumlin::offscreen::read_buffer(&self.device, &self.queue, &buffer, buffer.size())?;
         let rows = bytes
             .chunks(pitch as usize)
             .map(|row| &row[..4 * width as usize]);

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use anyhow::{Context, Error, Result};
+use anyhow::{Context, Error, Result, anyhow};
 use drumlin_terminal::outcome::Outcome;
 use winit::{
     application::ApplicationHandler,
@@ -25,10 +25,15 @@ use crate::{
 const NOTCH_PX: f64 = 50.0;
 
 pub(crate) fn run(arguments: ViewArguments) -> Result<Outcome> {
-    let event_loop =
-        EventLoop::new().context("no display to open a window on (`drumlin fly` makes pictures without one)")?;
+    let event_loop = EventLoop::new().map_err(|_| {
+        anyhow!("no display to open a window on; `drumlin fly` makes pictures without one")
+    })?;
     event_loop.set_control_flow(ControlFlow::Poll);
-    let mut application = Application { arguments, viewer: None, error: None };
+    let mut application = Application {
+        arguments,
+        viewer: None,
+        error: None,
+    };
     event_loop.run_app(&mut application)?;
     application.error.map_or(Ok(Outcome::Done), Err)
 }
@@ -43,16 +48,21 @@ struct Application {
 impl Application {
     fn open(&self, event_loop: &ActiveEventLoop) -> Result<Viewer> {
         let Size([width, height]) = self.arguments.terrain.size;
-        let attributes =
-            Window::default_attributes().with_title("Drumlin").with_inner_size(PhysicalSize::new(width, height));
-        let window = event_loop.create_window(attributes).context("the window cannot be opened")?;
+        let attributes = Window::default_attributes()
+            .with_title("Drumlin")
+            .with_inner_size(PhysicalSize::new(width, height));
+        let window = event_loop
+            .create_window(attributes)
+            .context("the window cannot be opened")?;
         let screen = Screen::new(Arc::new(window), event_loop.owned_display_handle())?;
         Viewer::new(screen, self.arguments.clone())
     }
 
     /// Does something with the viewer; an error ends the program.
     fn with(&mut self, event_loop: &ActiveEventLoop, act: impl FnOnce(&mut Viewer) -> Result<()>) {
-        let Some(viewer) = &mut self.viewer else { return };
+        let Some(viewer) = &mut self.viewer else {
+            return;
+        };
         if let Err(error) = act(viewer) {
             self.error = Some(error);
         }
@@ -76,11 +86,21 @@ impl ApplicationHandler for Application {
         }
     }
 
-    fn window_event(&mut self, event_loop: &ActiveEventLoop, _window: WindowId, event: WindowEvent) {
+    fn window_event(
+        &mut self,
+        event_loop: &ActiveEventLoop,
+        _window: WindowId,
+        event: WindowEvent,
+    ) {
         self.with(event_loop, |viewer| handle(viewer, event));
     }
 
-    fn device_event(&mut self, event_loop: &ActiveEventLoop, _device: DeviceId, event: DeviceEvent) {
+    fn device_event(
+        &mut self,
+        event_loop: &ActiveEventLoop,
+        _device: DeviceId,
+        event: DeviceEvent,
+    ) {
         if let DeviceEvent::MouseMotion { delta: (x, y) } = event {
             self.with(event_loop, |viewer| {
                 viewer.mouse_moved([x, y]);
@@ -102,7 +122,11 @@ fn handle(viewer: &mut Viewer, event: WindowEvent) -> Result<()> {
         WindowEvent::CloseRequested => viewer.leave(),
         WindowEvent::Resized(size) => viewer.resize(size.width, size.height),
         WindowEvent::Focused(false) => viewer.release(),
-        WindowEvent::MouseInput { state, button: MouseButton::Left | MouseButton::Right, .. } => {
+        WindowEvent::MouseInput {
+            state,
+            button: MouseButton::Left | MouseButton::Right,
+            ..
+        } => {
             viewer.drag(state == ElementState::Pressed);
         }
         WindowEvent::MouseWheel { delta, .. } => viewer.wheel(match delta {

@@ -6,7 +6,7 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use drumlin::wgpu;
+use drumlin::{Pace, wgpu};
 use image::RgbaImage;
 use winit::{keyboard::KeyCode, window::Window};
 
@@ -14,6 +14,7 @@ use crate::{
     arguments::ViewArguments,
     camera::Camera,
     controls::Controls,
+    data_set::DataSet,
     frames::write_png,
     path::Path,
     scene::{Debug, Scene},
@@ -55,18 +56,35 @@ struct Clock {
 
 impl Viewer {
     pub(crate) fn new(screen: Screen, arguments: ViewArguments) -> Result<Self> {
-        let scene = Scene::open(&screen.device, &screen.queue, screen.format(), &arguments.terrain)?;
-        let path = Path::new(&scene.keys(arguments.terrain.path.as_deref())?, &scene.frame())?;
+        let data = DataSet::open(&arguments.terrain.pyramid)?;
+        let path = Path::new(
+            &data.keys(arguments.terrain.path.as_deref())?,
+            &data.frame(),
+        )?;
+        let scene = Scene::open(
+            &data,
+            &screen.device,
+            &screen.queue,
+            screen.format(),
+            &arguments.terrain,
+            Pace::Paced,
+        )?;
         let now = Instant::now();
         Ok(Self {
             camera: path.camera(0.0),
-            controls: Controls::new(scene.size_metres()),
-            debug: Debug::default(),
+            controls: Controls::new(data.size_metres()),
+            debug: Debug::of(&arguments.terrain),
             playing: arguments.play.then_some(0.0),
             dragging: false,
             done: false,
             screenshot_wanted: false,
-            clock: Clock { start: now, last: now, frames: 0, millis: 0.0, titled: now },
+            clock: Clock {
+                start: now,
+                last: now,
+                frames: 0,
+                millis: 0.0,
+                titled: now,
+            },
             screen,
             scene,
             arguments,
@@ -117,7 +135,13 @@ impl Viewer {
         }
         match Command::of(key).filter(|_| down && !repeat) {
             Some(Command::Leave) => self.done = true,
-            Some(Command::Play) => self.playing = if self.playing.is_some() { None } else { Some(0.0) },
+            Some(Command::Play) => {
+                self.playing = if self.playing.is_some() {
+                    None
+                } else {
+                    Some(0.0)
+                }
+            }
             Some(Command::Screenshot) => self.screenshot_wanted = true,
             Some(Command::Wireframe) => self.debug.wireframe ^= true,
             Some(Command::DepthColors) => self.debug.depth_colors ^= true,
@@ -131,9 +155,16 @@ impl Viewer {
         let Some(texture) = self.screen.acquire()? else {
             return Ok(());
         };
-        let view = self.scene.view(&self.camera, self.screen.size(), self.clock.start.elapsed().as_secs_f64());
+        let view = self.scene.view(
+            &self.camera,
+            self.screen.size(),
+            self.clock.start.elapsed().as_secs_f64(),
+        );
         self.scene.update(&view, self.debug);
-        let last = self.arguments.exit_after.is_some_and(|count| self.clock.frames >= count);
+        let last = self
+            .arguments
+            .exit_after
+            .is_some_and(|count| self.clock.frames >= count);
         let picture = (self.screenshot_wanted || last).then(|| self.screen.readable_picture());
         self.draw(&texture.texture, picture.as_ref());
         self.screen.window.pre_present_notify();
@@ -147,10 +178,14 @@ impl Viewer {
     }
 
     fn draw(&mut self, window: &wgpu::Texture, picture: Option<&wgpu::Texture>) {
-        let mut encoder = self.screen.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        self.scene.prepare(&self.screen.device, &self.screen.queue, &mut encoder);
+        let mut encoder = self
+            .screen
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.scene
+            .prepare(&self.screen.device, &self.screen.queue, &mut encoder);
         for target in [Some(window), picture].into_iter().flatten() {
-            let mut pass = self.screen.pass(&mut encoder, target, self.scene.background());
+            let mut pass = self.screen.pass(&mut encoder, target, Scene::background());
             self.scene.draw(&mut pass);
         }
         self.screen.queue.submit([encoder.finish()]);
@@ -176,7 +211,8 @@ impl Viewer {
             return Ok(());
         }
         self.screenshot_wanted = false;
-        let pixels = RgbaImage::from_raw(width, height, self.screen.read(picture)?).context("a short picture")?;
+        let pixels = RgbaImage::from_raw(width, height, self.screen.read(picture)?)
+            .context("a short picture")?;
         let file = named.unwrap_or_else(free_name);
         write_png(&file, &pixels)?;
         eprintln!("drumlin-view: wrote {}", file.display());
@@ -188,13 +224,23 @@ impl Viewer {
             return;
         }
         self.clock.titled = Instant::now();
-        let name = self.arguments.terrain.pyramid.file_name().unwrap_or_default().to_string_lossy();
-        let report = self.scene.status();
-        let missing = if report.missing > 0 { format!(", {} tiles missing", report.missing) } else { String::new() };
+        let name = self
+            .arguments
+            .terrain
+            .pyramid
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy();
+        let report = self.scene.report();
+        let triangles = report.counts.map_or(0, |counts| counts.triangles);
+        let stats = &report.stats;
+        let tiles = stats.tiles_drawn;
+        let missing = match stats.tiles_missing {
+            0 => String::new(),
+            missing => format!(", {missing} missing"),
+        };
         let millis = self.clock.millis;
         let speed = self.controls.speed();
-        let triangles = report.triangles;
-        let tiles = report.tiles;
         self.screen.window.set_title(&format!(
             "{name}: {millis:.1} ms, {triangles} triangles in {tiles} tiles{missing}, {speed:.0} m/s"
         ));
@@ -216,5 +262,8 @@ impl Clock {
 /// A file name that is not taken.
 fn free_name() -> PathBuf {
     let name = |number: u32| PathBuf::from(format!("drumlin_{number:04}.png"));
-    (1..9999).map(name).find(|file: &PathBuf| !FilePath::exists(file)).unwrap_or_else(|| name(9999))
+    (1..9999)
+        .map(name)
+        .find(|file: &PathBuf| !FilePath::exists(file))
+        .unwrap_or_else(|| name(9999))
 }

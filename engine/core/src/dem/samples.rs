@@ -45,6 +45,7 @@ pub(super) struct Scaling {
 }
 
 impl Scaling {
+    #[cfg(test)]
     /// Stored numbers are metres and none is void.
     pub(super) const METRES: Self = Self {
         nodata: None,

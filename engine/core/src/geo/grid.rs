@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{TILE_CELLS, TileId};
 
+#[expect(clippy::cast_possible_truncation, reason = "128 fits")]
+const CELLS: u32 = TILE_CELLS as u32;
+
 /// A box in CRS coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Extent {
@@ -87,8 +90,7 @@ impl Grid {
     /// Rows and columns of tiles that cover the grid at its finest level; at least one of each.
     #[must_use]
     pub fn finest_tiles(&self) -> [u32; 2] {
-        let cells = TILE_CELLS as u32;
-        [self.rows, self.columns].map(|samples| samples.saturating_sub(1).div_ceil(cells).max(1))
+        [self.rows, self.columns].map(|samples| samples.saturating_sub(1).div_ceil(CELLS).max(1))
     }
 
     /// Levels from the one tile of level 0 to the finest.
@@ -96,7 +98,7 @@ impl Grid {
     pub fn level_count(&self) -> u8 {
         let [rows, columns] = self.finest_tiles();
         let side = rows.max(columns);
-        (32 - (side - 1).leading_zeros() + 1) as u8
+        (0..32).find(|&level| side <= 1 << level).unwrap_or(32) + 1
     }
 
     /// Rows and columns of tiles at a level.

@@ -36,7 +36,7 @@ pub struct Level {
     pub tiles: [u32; 2],
     /// Height units a code step: q.
     pub step: i32,
-    /// True when the cage is stored whole, in units, and not as codes against the subdivided parent.
+    /// True when the cage is stored whole, so that no parent is needed, and not as codes against the subdivided parent.
     pub key: bool,
     /// Bytes a cage number: 1, 2 or 4.
     pub cage_bytes: u8,

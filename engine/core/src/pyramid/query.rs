@@ -31,6 +31,21 @@ const CAGE_COUNT: NonZero<usize> = NonZero::new(256).unwrap();
 const SNAP: f64 = 1e-6;
 
 /// Answers for heights, with the tiles it used last.
+///
+/// ```no_run
+/// use std::{path::Path, sync::Arc};
+///
+/// use drumlin_core::pyramid::{Heights, Pyramid, PyramidError};
+///
+/// fn main() -> Result<(), PyramidError> {
+///     let heights = Heights::new(Arc::new(Pyramid::open(Path::new("rainier.zarr"))?));
+///     match heights.height_at([-121.76, 46.853])? {
+///         Some(metres) => println!("{metres} m"),
+///         None => println!("void, or outside"),
+///     }
+///     Ok(())
+/// }
+/// ```
 #[derive(Debug)]
 pub struct Heights {
     pyramid: Arc<Pyramid>,

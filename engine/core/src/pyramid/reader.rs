@@ -46,6 +46,8 @@ impl Array {
 }
 
 /// A pyramid, open for reading from any number of threads.
+///
+/// One that is replaced on the disk while it is open must be opened again.
 #[derive(Debug)]
 pub struct Pyramid {
     store: Box<dyn Store>,
@@ -125,11 +127,11 @@ impl Pyramid {
         }
         let record = self.read_record(tile)?;
         let step = self.metadata.levels[usize::from(tile.level)].step;
-        let controls = match parent.filter(|_| !key) {
+        let controls: Box<[i32]> = match parent.filter(|_| !key) {
             Some(parent) => {
                 surface::decode_controls(parent, tile.quadrant(), &record.cage, step).into()
             }
-            None => record.cage,
+            None => surface::decode_key_controls(&record.cage, step).into(),
         };
         if let Some(control) = controls
             .iter()

@@ -25,7 +25,7 @@ pub struct RecordParts<'a> {
     pub patch_codes: &'a [u8],
     /// 129 × 129 void bits; ignored where the level stores none, none void where it does and they are missing.
     pub voids: Option<&'a [u8]>,
-    /// 35 × 35 stored cage numbers: controls of a key level, else codes.
+    /// 35 × 35 stored cage numbers: codes against neighbours at a key level, else against the parent.
     pub cage: &'a [i32],
     /// 129 × 129 residual codes.
     pub detail: &'a [i32],
@@ -44,7 +44,7 @@ pub struct Record {
     pub patch_codes: Box<[u8]>,
     /// 129 × 129 void bits, where the level stores them.
     pub voids: Option<Box<[u8]>>,
-    /// 35 × 35 stored cage numbers: controls of a key level, else codes.
+    /// 35 × 35 stored cage numbers: codes against neighbours at a key level, else against the parent.
     pub cage: Box<[i32]>,
     /// 129 × 129 residual codes.
     pub detail: Box<[i32]>,

@@ -70,7 +70,7 @@ pub(super) fn metadata(rows: u32, columns: u32) -> Metadata {
 }
 
 /// Writes the small pyramid.
-pub(super) fn write(path: &Path, rows: u32, columns: u32) -> Metadata {
+pub(crate) fn write(path: &Path, rows: u32, columns: u32) -> Metadata {
     let metadata = metadata(rows, columns);
     let writer = PyramidWriter::create(path, false).unwrap();
     let shards = write_with(&writer, rows, columns);
@@ -147,7 +147,11 @@ fn records(metadata: &Metadata) -> HashMap<TileId, Vec<u8>> {
         });
         let level = &metadata.levels[usize::from(tile.level)];
         let (stored, decoded) = match tile.parent().filter(|_| !level.key) {
-            None => (wanted.clone(), wanted),
+            None => {
+                let codes = surface::encode_key_controls(&wanted, level.step);
+                let decoded = surface::decode_key_controls(&codes, level.step);
+                (codes, decoded)
+            }
             Some(parent) => {
                 let parent: &Vec<i32> = &controls[&parent];
                 let codes = surface::encode_controls(&wanted, parent, tile.quadrant(), level.step);

@@ -93,6 +93,65 @@ pub fn encode_controls(wanted: &[i32], parent: &[i32], quadrant: u32, step: i32)
         .collect()
 }
 
+/// The controls of a key tile from its codes: K = q k, where k is the code plus the median of west, north and
+/// west + north − north-west, all 0 past the edge.
+///
+/// No parent is needed. Wraps where numbers are absurd.
+///
+/// Based on: M. Weinberger, G. Seroussi, G. Sapiro, "The LOCO-I lossless image compression algorithm", 2000.
+///
+/// # Panics
+///
+/// Where `codes` is not 35 × 35 long.
+#[must_use]
+pub fn decode_key_controls(codes: &[i32], step: i32) -> Vec<i32> {
+    assert_eq!(codes.len(), CAGE_CONTROL_COUNT, "a cage");
+    let mut whole = vec![0_i32; CAGE_CONTROL_COUNT];
+    for (at, code) in codes.iter().enumerate() {
+        whole[at] = code.wrapping_add(predict_key(&whole, at));
+    }
+    whole.iter_mut().for_each(|k| *k = k.wrapping_mul(step));
+    whole
+}
+
+/// The codes whose controls come nearest to the wanted ones; [`decode_key_controls`] turns them back.
+///
+/// # Panics
+///
+/// Where `wanted` is not 35 × 35 long.
+#[must_use]
+pub fn encode_key_controls(wanted: &[i32], step: i32) -> Vec<i32> {
+    assert_eq!(wanted.len(), CAGE_CONTROL_COUNT, "a cage");
+    let whole: Vec<i32> = wanted
+        .iter()
+        .map(|control| nearest_code(*control, step))
+        .collect();
+    whole
+        .iter()
+        .enumerate()
+        .map(|(at, k)| k - predict_key(&whole, at))
+        .collect()
+}
+
+/// What a key tile's controls before place `at` say of the one there.
+fn predict_key(whole: &[i32], at: usize) -> i32 {
+    let (row, column) = (at / CAGE_CONTROLS, at % CAGE_CONTROLS);
+    let west = if column > 0 { whole[at - 1] } else { 0 };
+    let north = if row > 0 {
+        whole[at - CAGE_CONTROLS]
+    } else {
+        0
+    };
+    let corner = if row > 0 && column > 0 {
+        whole[at - CAGE_CONTROLS - 1]
+    } else {
+        0
+    };
+    west.wrapping_add(north)
+        .wrapping_sub(corner)
+        .clamp(west.min(north), west.max(north))
+}
+
 /// The limit surface at a tile's samples: 129 × 129 heights B, rounded half up.
 ///
 /// # Panics

@@ -1,8 +1,15 @@
 //! The structs and constants that WGSL and Rust share, by hand on both sides and checked by a test.
 //!
-//! Twins: `shaders/shared/{constants,frame,tile}.wgsl`.
+//! Twins: `shaders/shared/{constants,frame,tile,upload,draw_list}.wgsl`; the modules below have twins of their own.
 
 use bytemuck::{Pod, Zeroable};
+
+pub mod border;
+pub mod colors;
+pub mod ground;
+pub mod patch_word;
+pub mod pool;
+pub mod synthetic;
 
 /// No tile, no slot, no fixed depth.
 pub const NONE: u32 = u32::MAX;
@@ -27,6 +34,30 @@ pub const CONTROLS_WORD: usize = 36_107;
 pub const SLOT_WORDS: usize = 37_376;
 /// Slots of a pool page of at most 128 MiB.
 pub const SLOTS_PER_PAGE: u32 = 897;
+
+/// First word of an upload's controls: 1,225 i32, units.
+pub const UPLOAD_CONTROLS_WORD: usize = 0;
+/// First word of an upload's detail: 16,641 i32, codes.
+pub const UPLOAD_DETAIL_WORD: usize = 1_225;
+/// First word of an upload's void bits: 521 words.
+pub const UPLOAD_VOIDS_WORD: usize = 17_866;
+/// First word of an upload's patch codes: 256 words, four codes a word, lowest byte first.
+pub const UPLOAD_CODES_WORD: usize = 18_387;
+/// Words of an upload in the staging buffer: 74,572 bytes.
+pub const UPLOAD_WORDS: usize = 18_643;
+
+/// First of the five words of the draw's arguments: the index count.
+pub const INDEX_COUNT_WORD: usize = 0;
+/// The draw's instance count: 1 as soon as anything is drawn.
+pub const INSTANCE_COUNT_WORD: usize = 1;
+/// First of three words: indices at shift 0, 1, 2.
+pub const SHIFT_COUNTS_WORD: usize = 5;
+/// Indices reserved so far.
+pub const CURSOR_WORD: usize = 8;
+/// First of six words: patches by depth, regular ones first, then transition ones.
+pub const CLASS_COUNTS_WORD: usize = 9;
+/// Words of the head of the emitted list.
+pub const DRAW_LIST_WORDS: usize = 16;
 
 /// Void triangles are drawn with their filled heights.
 pub const FLAG_DRAW_VOIDS: u32 = 1;
@@ -135,4 +166,22 @@ pub struct DrawnTile {
     pub side_south: [u32; 2],
     /// Neighbours across the west side, north half first.
     pub side_west: [u32; 2],
+}
+
+/// A tile on its way into the pool.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct UploadHeader {
+    /// Its slot within the page.
+    pub slot: u32,
+    /// Units a code step: q.
+    pub quantum: i32,
+    /// Metres a height unit.
+    pub unit: f32,
+    /// 0.
+    pub reserved: u32,
+    /// Metres a column (east, positive) and a row (north, negative).
+    pub step: [f32; 2],
+    /// 0.
+    pub reserved_2: [f32; 2],
 }

@@ -38,8 +38,7 @@ pub fn smooth_limit(valence: usize) -> SmoothLimit {
 /// Second largest eigenvalue of a smooth vertex's subdivision: rings shrink by it from level to level.
 #[must_use]
 pub fn subdominant_eigenvalue(valence: usize) -> f64 {
-    let c = (2.0 * PI / valence as f64).cos();
-    (5.0 + c + ((9.0 + c) * (1.0 + c)).sqrt()) / 16.0
+    eigenvalue((2.0 * PI / valence as f64).cos())
 }
 
 /// Weights of E_i and D_i in the limit tangent of a smooth vertex along its edge 0.
@@ -51,7 +50,11 @@ pub fn smooth_tangent(valence: usize, i: usize) -> [f64; 2] {
     let n = valence as f64;
     let angle = |i: usize| (2.0 * PI * i as f64 / n).cos();
     let c = angle(1);
-    let edge = 1.0 + c + (PI / n).cos() * (2.0 * (9.0 + c)).sqrt();
+    let edge = if valence == 2 {
+        4.0
+    } else {
+        16.0 * eigenvalue(c) - 4.0
+    };
     let scale = 2.0 / (n * (edge + 2.0));
     [scale * edge * angle(i), scale * (angle(i) + angle(i + 1))]
 }
@@ -63,49 +66,67 @@ pub struct CreaseTangent {
     pub vertex: f64,
     /// Weight of each of the crease's two neighbours.
     pub crease: f64,
-    faces: usize,
-    scale: f64,
+    inner: f64,
+    diagonal: f64,
+    angle: f64,
 }
 
 impl CreaseTangent {
     /// Weight of the `i`-th E inside the side, `1 <= i < faces`, counted from the crease's first edge as 0.
     #[must_use]
     pub fn edge(&self, i: usize) -> f64 {
-        4.0 * self.scale * (PI * i as f64 / self.faces as f64).sin()
+        self.inner * (self.angle * i as f64).sin()
     }
 
     /// Weight of the `i`-th D of the side.
     #[must_use]
     pub fn diagonal(&self, i: usize) -> f64 {
-        let angle = PI / self.faces as f64;
-        self.scale * ((angle * i as f64).sin() + (angle * (i + 1) as f64).sin())
+        self.diagonal * ((self.angle * i as f64).sin() + (self.angle * (i + 1) as f64).sin())
     }
 }
 
-/// The tangent across a crease with `faces` faces on that side (Biermann et al. 2000, appendix A).
+/// The tangent across a crease with `faces` faces on that side.
 ///
-/// With one face only the surface has a cusp across: the tangent is then the mean of the two edges.
+/// It is the left eigenvector of subdivision there with sin(π i / faces) on the i-th E. Biermann et al. 2000 give one
+/// of the same form for rules they change to have eigenvalue 1/2; ours is for Catmull-Clark's own rules, and the same
+/// at two faces. With one face the surface has a cusp across: the tangent is then the mean of the two edges. With more
+/// than three faces the surface has no tangent plane at the vertex (a second wave shrinks no faster than the crease);
+/// this tangent and the crease's own are then the sensible plane.
 #[must_use]
 pub fn crease_tangent(faces: usize) -> CreaseTangent {
+    let angle = PI / faces.max(1) as f64;
     if faces < 2 {
         return CreaseTangent {
             vertex: -1.0,
             crease: 0.5,
-            faces: 1,
-            scale: 0.0,
+            inner: 0.0,
+            diagonal: 0.0,
+            angle,
         };
     }
-    let k = faces as f64;
-    let (sin, cos) = (PI / k).sin_cos();
-    let ratio = (1.0 + cos) / sin;
-    // With this scale two faces give the bicubic patch its own derivative.
-    let scale = 1.0 / (k * (3.0 + cos));
+    let (sin, cos) = angle.sin_cos();
+    let eigenvalue = eigenvalue(cos);
+    // Two faces give the bicubic patch's own derivative.
+    let scale = 1.0 / (faces as f64 * (3.0 + cos));
+    // E columns: inner (3 + cos) / 8 + diagonal (1 + cos) / 2 = eigenvalue · inner; D columns: inner / 16 + diagonal / 4
+    // = eigenvalue · diagonal. The V column and the sum of all weights, which is zero, leave these two:
+    let inner = 16.0 * eigenvalue - 4.0;
+    let sines = (1.0 + cos) / sin;
+    let crease = -sines * (32.0 * eigenvalue * eigenvalue - 16.0 * eigenvalue + 1.0)
+        / (4.0 * eigenvalue - 1.0);
+    let vertex = -2.0 * crease - sines * (inner + 2.0);
     CreaseTangent {
-        vertex: 4.0 * scale * ratio * (cos - 1.0),
-        crease: -scale * ratio * (1.0 + 2.0 * cos),
-        faces,
-        scale,
+        vertex: scale * vertex,
+        crease: scale * crease,
+        inner: scale * inner,
+        diagonal: scale,
+        angle,
     }
+}
+
+/// The larger eigenvalue of a ring's wave whose neighbours differ by an angle of this cosine.
+fn eigenvalue(cos: f64) -> f64 {
+    (5.0 + cos + ((9.0 + cos) * (1.0 + cos)).sqrt()) / 16.0
 }
 
 #[cfg(test)]
@@ -124,7 +145,7 @@ mod tests {
 
     #[test]
     fn tangent_masks_sum_to_zero() {
-        for valence in 3..50 {
+        for valence in 2..50 {
             let sum: f64 = (0..valence).flat_map(|i| smooth_tangent(valence, i)).sum();
             assert!(sum.abs() < 1e-14);
         }

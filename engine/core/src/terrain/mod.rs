@@ -1,5 +1,26 @@
 //! Wires the rest: a view and a pyramid become a frame plan.
+//!
+//! ```text
+//! View → Updater (a thread of its own, or none) → Planner → FramePlan ‖ GPU
+//! height_at, normal_at, raycast → Surface: the same integers on the CPU
+//! ```
 
+mod frame;
 mod frame_plan;
+mod list;
+mod planner;
+mod pool;
+mod raycast;
+mod source;
+mod stats;
+mod surface;
+mod update;
 
-pub use frame_plan::{ColorUpload, FramePlan, Upload};
+pub use frame_plan::{ColorUpload, FramePlan, Place, Upload};
+pub use planner::{Planner, PlannerDescriptor};
+pub use pool::PoolSizes;
+pub use raycast::Hit;
+pub use source::PyramidSource;
+pub use stats::FrameStats;
+pub use surface::{Collider, Surface};
+pub use update::{Planned, Updater};

@@ -239,4 +239,6 @@ fn wrong(place: &Place, reason: &'static str) -> CageError {
 }
 
 #[cfg(test)]
+mod laws;
+#[cfg(test)]
 mod tests;

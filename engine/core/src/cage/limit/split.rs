@@ -13,29 +13,61 @@ use super::{LimitSample, Place};
 /// less than one part in 10¹²: a ring shrinks by at least 0.66 a level at any valence.
 const DEEPEST: u32 = 72;
 
-/// Memory reused from place to place.
+/// A quarter of a quarter of … a face, and its own quarters as far as they are known.
+#[derive(Debug, Default)]
+struct Quarter {
+    hood: Neighbourhood,
+    /// Its patch, where it is regular.
+    patch: Option<Patch>,
+    /// Places of its quarters among all; the whole's, 0, for those not known.
+    quarters: [usize; 4],
+}
+
+impl Quarter {
+    fn settle(&mut self) {
+        self.patch = regular_sides(&self.hood).map(|sides| patch(&self.hood, sides));
+        self.quarters = [WHOLE; 4];
+    }
+}
+
+/// Place of the whole face among its quarters.
+const WHOLE: usize = 0;
+
+/// Quarters kept of one face, about two megabytes. Past that its splitting begins anew.
+const MOST_QUARTERS: usize = 1024;
+
+/// The face last split, and memory reused from face to face.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
-    /// The neighbourhood of the face last loaded.
-    whole: Neighbourhood,
     face: Option<u32>,
-    /// Two levels of splitting.
-    part: Neighbourhood,
-    quarter: Neighbourhood,
+    /// The whole face first; only so many are in use.
+    quarters: Vec<Quarter>,
+    used: usize,
 }
 
 impl Scratch {
     fn load(&mut self, cage: &Cage, face: u32) {
         if self.face != Some(face) {
-            self.whole.load(cage, face);
+            self.fill(|hood| hood.load(cage, face));
             self.face = Some(face);
         }
     }
 
     /// Takes a neighbourhood that is no face's.
     pub(super) fn fill(&mut self, fill: impl FnOnce(&mut Neighbourhood)) {
-        self.face = None;
-        fill(&mut self.whole);
+        (self.face, self.used) = (None, 0);
+        self.add(fill);
+    }
+
+    fn add(&mut self, fill: impl FnOnce(&mut Neighbourhood)) -> usize {
+        if self.used == self.quarters.len() {
+            self.quarters.push(Quarter::default());
+        }
+        let quarter = &mut self.quarters[self.used];
+        fill(&mut quarter.hood);
+        quarter.settle();
+        self.used += 1;
+        self.used - 1
     }
 
     /// The patch of a face that is one.
@@ -49,14 +81,16 @@ impl Scratch {
             return Some(patch);
         }
         self.load(cage, face);
-        let mut patch = patch(&self.whole, regular_sides(&self.whole)?);
+        let whole = &self.quarters[WHOLE];
+        let mut patch = whole.patch.clone()?;
         patch
             .controls
             .iter_mut()
-            .for_each(|control| *control += self.whole.origin);
+            .for_each(|control| *control += whole.hood.origin);
         Some(patch)
     }
 
+    /// The surface at a place of an all-quad cage.
     pub(super) fn evaluate(
         &mut self,
         regular: &RegularFaces,
@@ -72,12 +106,15 @@ impl Scratch {
 
     /// Splits the face's neighbourhood towards (u, v) until the surface there is known.
     pub(super) fn split_to(&mut self, mut u: f64, mut v: f64) -> LimitSample {
-        let mut scale = 1.0;
-        let mut depth = 0;
+        if self.used > MOST_QUARTERS {
+            self.used = 1;
+            self.quarters[WHOLE].quarters = [WHOLE; 4];
+        }
+        let (mut here, mut depth, mut scale) = (WHOLE, 0, 1.0);
         loop {
-            let hood = if depth == 0 { &self.whole } else { &self.part };
-            if let Some(sides) = regular_sides(hood) {
-                return sample(patch(hood, sides).evaluate(u, v), hood.origin, scale);
+            let Quarter { hood, patch, .. } = &self.quarters[here];
+            if let Some(patch) = patch {
+                return sample(patch.evaluate(u, v), hood.origin, scale);
             }
             let q = corner_towards(u, v);
             let on_vertex = [u, v].iter().all(|&x| x == 0.0 || x == 1.0);
@@ -88,14 +125,26 @@ impl Scratch {
                 let limit = vertex_limit(&hood.rings[q]).unwrap_or_else(|| last_resort(hood, q));
                 return vertex_sample(limit, q, hood.origin, scale);
             }
-            hood.split(q, &mut self.quarter);
-            std::mem::swap(&mut self.part, &mut self.quarter);
+            here = self.quarter(here, q);
             (u, v) = (
                 2.0 * u - f64::from(q == 1 || q == 2),
                 2.0 * v - f64::from(q >= 2),
             );
             (depth, scale) = (depth + 1, 2.0 * scale);
         }
+    }
+
+    /// The quarter of a quarter at corner `q`, split off unless it is known.
+    fn quarter(&mut self, of: usize, q: usize) -> usize {
+        let known = self.quarters[of].quarters[q];
+        if known != WHOLE {
+            return known;
+        }
+        let parent = std::mem::take(&mut self.quarters[of].hood);
+        let child = self.add(|hood| parent.split(q, hood));
+        self.quarters[of].hood = parent;
+        self.quarters[of].quarters[q] = child;
+        child
     }
 }
 

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::options::{Stage, Watch};
-use super::quantise::{LevelCage, is_key, quantise};
+use super::quantise::{LevelCage, is_key, key_width, quantise};
 use super::samples::{LevelSamples, array_size};
 use super::scale::Scale;
 use super::{fit, sample, voids};
@@ -93,7 +93,12 @@ impl Levels {
             let step = scale.step_at(grid.level_count() - 1 - level);
             let mut cage = LevelCage::new(tiles, fit::cage(samples, tiles));
             let parent = cages.last().filter(|_| !key);
-            let cage_bytes = quantise(&mut cage, parent, step)?;
+            let width = quantise(&mut cage, parent, step)?;
+            let cage_bytes = if key {
+                key_width(&cage, tiles, step)
+            } else {
+                width
+            };
             let voids = samples.voids.is_some();
             levels.push(Level {
                 tiles,

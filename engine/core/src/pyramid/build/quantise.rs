@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use crate::geo::{CAGE_CONTROL_COUNT, CAGE_CONTROLS, TILE_QUADS};
-use crate::pyramid::surface::CONTROL_LIMIT;
+use crate::pyramid::surface::{CONTROL_LIMIT, encode_key_controls};
 use crate::pyramid::{PyramidError, number_bytes};
 
 /// Every fourth level stores its controls whole.
@@ -78,7 +78,7 @@ pub(super) fn is_key(level: u8) -> bool {
 }
 
 /// Makes a fitted cage the one a decoder will see: prediction + q r, or on a key level (no parent given) whole steps.
-/// Returns how many bytes the widest stored number takes.
+/// Returns how many bytes the widest r takes.
 ///
 /// # Errors
 /// [`PyramidError::Refused`] where a control leaves the range of the 32-bit rule.
@@ -116,13 +116,22 @@ pub(super) fn quantise(
     Ok(width)
 }
 
+/// How many bytes the widest stored number of a key level takes.
+pub(super) fn key_width(cage: &LevelCage, tiles: [u32; 2], step: i32) -> u8 {
+    let width = |row: u32, column: u32| {
+        let codes = encode_key_controls(&cage.tile([row, column]), step);
+        codes.into_iter().map(number_bytes).max().unwrap_or(1)
+    };
+    let row_width = |row| (0..tiles[1]).map(|column| width(row, column)).max();
+    (0..tiles[0])
+        .into_par_iter()
+        .filter_map(row_width)
+        .max()
+        .unwrap_or(1)
+}
+
 /// `difference / step` rounded to nearest.
 fn nearest(difference: i32, step: i32) -> i32 {
-    static DEAD: std::sync::LazyLock<i32> =
-        std::sync::LazyLock::new(|| std::env::var("DEAD").map_or(50, |v| v.parse().unwrap()));
-    if difference.abs() * 100 <= step * *DEAD {
-        return 0;
-    }
     (difference + step / 2).div_euclid(step)
 }
 

@@ -7,10 +7,10 @@ use super::levels::Levels;
 use super::measure::{Finest, TileErrors, measure};
 use super::options::{Stage, Watch};
 use crate::geo::{Grid, TileId};
-use crate::pyramid::surface::{child_window, encode_detail};
+use crate::pyramid::surface::{child_window, encode_detail, encode_key_controls};
 use crate::pyramid::{
-    PyramidError, PyramidWriter, RecordLayout, RecordParts, ShardInfo, Summary, patch_nibble,
-    shard_count,
+    NEVER, PyramidError, PyramidWriter, RecordLayout, RecordParts, ShardInfo, Summary,
+    patch_nibble, shard_count,
 };
 
 /// What was measured of a tile.
@@ -110,7 +110,8 @@ fn measure_tile(
     let voids = samples.tile_voids(place).map_or(0, |(_, count)| count);
     let mut summary = summarise(&heights, voids, ceil_f32(errors.whole * unit), children);
     features.add_to(&mut summary, tile);
-    let patch_codes = patch_codes(&errors, summary.error, unit);
+    let base = summary.error.max(ceil_f32(unit));
+    let patch_codes = patch_codes(&errors, tile, grid, base, unit);
     Measured {
         summary,
         patch_codes,
@@ -144,26 +145,15 @@ fn summarise(heights: &[i32], voids: usize, error: f32, children: &[Summary; 4])
     summary
 }
 
-fn patch_codes(errors: &TileErrors, tile_error: f32, unit: f64) -> Vec<u8> {
-    let base = tile_error.max(ceil_f32(unit));
-    let mode: u32 = std::env::var("EXP").map_or(0, |v| v.parse().unwrap());
+/// A finest tile stores no patch errors: there they equal the stride errors of its own heights, which every reader
+/// computes and takes the lesser of, exactly and without a byte.
+fn patch_codes(errors: &TileErrors, tile: TileId, grid: &Grid, base: f32, unit: f64) -> Vec<u8> {
+    let finest = tile.level + 1 == grid.level_count();
     let nibble = |error: f64| {
-        let n = patch_nibble(error * unit, base);
-        match mode {
-            1 => n.next_multiple_of(2).min(15),
-            2 => n.next_multiple_of(3).min(15),
-            3 => 15,
-            4 if tile_error == 0.0 => 15,
-            5 if tile_error == 0.0 => n.next_multiple_of(2).min(15),
-            6 if tile_error == 0.0 => n.next_multiple_of(2).max(6).min(15),
-            7 if tile_error == 0.0 => {
-                if n <= 6 {
-                    6
-                } else {
-                    n.next_multiple_of(3).min(15)
-                }
-            }
-            _ => n,
+        if finest {
+            NEVER
+        } else {
+            patch_nibble(error * unit, base)
         }
     };
     errors
@@ -188,7 +178,7 @@ pub(super) fn record(
     let measured = &measures[index][index_of(grid, tile)];
     let voids = levels.samples[index].tile_voids(place);
     let cage = match tile.parent().filter(|_| !level.key) {
-        None => controls,
+        None => encode_key_controls(&controls, level.step),
         Some(parent) => {
             let above = levels.cages[usize::from(parent.level)].tile([parent.row, parent.column]);
             let predicted = child_window(&above, tile.quadrant());

@@ -146,3 +146,57 @@ impl Dice {
         number
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pyramid::FileStore;
+
+    fn replies(faults: &Faults) -> (Vec<Option<Vec<u8>>>, u64) {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a"), (0..=255).collect::<Vec<u8>>()).unwrap();
+        let store = FaultStore::new(FileStore::new(folder.path()), faults.clone());
+        let replies = (0..100)
+            .map(|at| store.read("a", at..at + 50).ok())
+            .collect();
+        (replies, store.hit_count())
+    }
+
+    #[test]
+    fn a_store_without_faults_behaves() {
+        let (replies, hits) = replies(&Faults::default());
+        assert_eq!(hits, 0);
+        for (at, reply) in (0..).zip(replies) {
+            assert_eq!(reply, Some((at..at + 50).collect()));
+        }
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_faults_and_another_seed_others() {
+        let rates = Faults {
+            error_rate: 0.1,
+            truncate_rate: 0.1,
+            flip_rate: 0.1,
+            stale_rate: 0.1,
+            ..Faults::default()
+        };
+        let [one, again, other] = [1, 1, 2].map(|seed| {
+            replies(&Faults {
+                seed,
+                ..rates.clone()
+            })
+        });
+        assert!(one == again && one.0 != other.0);
+        assert!((20..60).contains(&one.1), "{} hits of about 39", one.1);
+    }
+
+    #[test]
+    fn only_keys_with_the_prefix_are_hit() {
+        let faults = Faults {
+            error_rate: 1.0,
+            prefix: "tile/".into(),
+            ..Faults::default()
+        };
+        assert!(replies(&faults).0.iter().all(Option::is_some));
+    }
+}

@@ -184,3 +184,19 @@ fn absurd_codes_wrap_and_do_not_panic() {
         CAGE_CONTROL_COUNT
     );
 }
+
+#[test]
+fn a_key_tile_needs_no_parent() {
+    let controls: Vec<i32> = (0..1225_i32)
+        .map(|at| 17 * ((at * 7919) % 4001 - 2000 + 300 * (at / 35)))
+        .collect();
+    let codes = encode_key_controls(&controls, 17);
+    assert_eq!(decode_key_controls(&codes, 17), controls);
+    let plane: Vec<i32> = (0..1225_i32)
+        .map(|at| 5 * (1000 + 3 * (at / 35) - 2 * (at % 35)))
+        .collect();
+    let codes = encode_key_controls(&plane, 5);
+    assert_eq!(codes.iter().filter(|code| code.abs() > 3).count(), 1);
+    let wrapped = decode_key_controls(&[i32::MAX; 1225], i32::MAX);
+    assert_eq!(wrapped.len(), 1225);
+}

@@ -1,0 +1,217 @@
+//! Heights, normals, rays and colliders agree with each other.
+
+use std::sync::Arc;
+
+use crate::{
+    geo::TileId,
+    stream::{TileSource, mix, synthetic::Synthetic},
+    terrain::Surface,
+};
+
+/// 300 × 260 metres, a sample a metre; a void in the second tile of the first row.
+fn surface() -> Surface {
+    let mut source = Synthetic::new(301, 261, 11);
+    source.rough = true;
+    source.void = Some(|id, row, column| {
+        id.row == 0 && id.column == 1 && row.abs_diff(60) + column.abs_diff(60) < 12
+    });
+    Surface::new(Arc::new(source))
+}
+
+fn random(seed: &mut u64, low: f64, high: f64) -> f64 {
+    *seed += 1;
+    low + (high - low) * (mix(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15)) % 1_000_000) as f64 / 1e6
+}
+
+#[test]
+fn heights_are_the_samples_and_planes_between_them() {
+    let surface = surface();
+    let at = |x: f64, y: f64| surface.height_at([x, y]).unwrap();
+    let finest = TileId::new(2, 0, 0);
+    let samples = surface.tile(finest).unwrap().heights().samples.clone();
+    for (row, column) in [(0, 0), (1, 1), (37, 81), (127, 126)] {
+        let [x, y] = [-150.0 + column as f64, 130.0 - row as f64];
+        assert_eq!(
+            at(x, y),
+            Some(f64::from(samples[row * 129 + column]) / 16.0)
+        );
+        let corner = |down: usize, right: usize| {
+            f64::from(samples[(row + down) * 129 + column + right]) / 16.0
+        };
+        let lower = 0.25 * corner(0, 0) + 0.5 * corner(1, 0) + 0.25 * corner(1, 1);
+        assert!((at(x + 0.25, y - 0.75).unwrap() - lower).abs() < 1e-9);
+        let upper = 0.25 * corner(0, 0) + 0.5 * corner(0, 1) + 0.25 * corner(1, 1);
+        assert!((at(x + 0.75, y - 0.25).unwrap() - upper).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn there_is_nothing_outside_and_in_voids() {
+    let surface = surface();
+    for place in [
+        [-150.1, 0.0],
+        [150.1, 0.0],
+        [0.0, 130.1],
+        [0.0, -130.1],
+        [f64::NAN, 0.0],
+        [38.0, 70.0],
+    ] {
+        assert_eq!(surface.height_at(place).unwrap(), None);
+        assert_eq!(surface.normal_at(place).unwrap(), None);
+    }
+    for place in [[-150.0, 130.0], [150.0, -130.0], [0.0, 0.0]] {
+        assert!(surface.height_at(place).unwrap().is_some());
+    }
+}
+
+#[test]
+fn normals_are_those_of_the_slopes() {
+    let (surface, mut seed) = (surface(), 1);
+    for _ in 0..200 {
+        let [x, y] = [(); 2].map(|()| random(&mut seed, -125.0, 0.0).floor());
+        let place = [x + 0.2, y + 0.3];
+        let [Some(here), Some(east), Some(north)] =
+            [[0.0, 0.0], [1e-3, 0.0], [0.0, 1e-3]].map(|step| {
+                surface
+                    .height_at([place[0] + step[0], place[1] + step[1]])
+                    .unwrap()
+            })
+        else {
+            panic!("no void here");
+        };
+        let normal = surface.normal_at(place).unwrap().unwrap();
+        assert!((normal.iter().map(|part| part * part).sum::<f64>() - 1.0).abs() < 1e-12);
+        assert!((-normal[0] / normal[2] - (east - here) / 1e-3).abs() < 1e-6);
+        assert!((-normal[1] / normal[2] - (north - here) / 1e-3).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn a_ray_stops_where_it_first_meets_the_surface() {
+    let (surface, mut seed) = (surface(), 7);
+    let mut hits = 0;
+    for index in 0..150 {
+        let origin = [
+            random(&mut seed, -170.0, 170.0),
+            random(&mut seed, -150.0, 150.0),
+            random(&mut seed, 40.0, 90.0),
+        ];
+        let mut direction = [0; 3].map(|_| random(&mut seed, -1.0, 1.0));
+        match index % 5 {
+            0 => direction = [0.0, 0.0, if index % 2 == 0 { 1.0 } else { -1.0 }],
+            1 => direction[2] *= 0.02,
+            2 => direction = [1.0, 0.0, -0.1],
+            _ => direction[2] = 2.0 * (50.0 - origin[2]) / 40.0,
+        }
+        let max = 200.0;
+        let hit = surface.raycast(origin, direction, max).unwrap();
+        let length = direction.iter().map(|part| part * part).sum::<f64>().sqrt();
+        let place = |t: f64| [0, 1, 2].map(|axis| origin[axis] + t * direction[axis] / length);
+        let above = |t: f64| {
+            let [x, y, z] = place(t);
+            surface.height_at([x, y]).unwrap().map(|height| z - height)
+        };
+        let end = hit.map_or(max, |hit| hit.distance);
+        let mut sign = None;
+        for step in 0..2000 {
+            let now = above((end - 1e-6) * f64::from(step) / 2000.0);
+            let Some(now) = now.filter(|above| above.abs() > 1e-6) else {
+                sign = None;
+                continue;
+            };
+            assert_eq!(
+                *sign.get_or_insert(now > 0.0),
+                now > 0.0,
+                "ray {index} passed through the surface"
+            );
+        }
+        if let Some(hit) = hit {
+            hits += 1;
+            assert!(above(hit.distance).unwrap().abs() < 1e-6);
+            assert!(
+                hit.position
+                    .iter()
+                    .zip(place(hit.distance))
+                    .all(|(a, b)| (a - b).abs() < 1e-9)
+            );
+        }
+    }
+    assert!(hits > 40);
+}
+
+#[test]
+fn a_ray_goes_through_a_void_and_ends_at_max() {
+    let surface = surface();
+    assert!(
+        surface
+            .raycast([38.0, 70.0, 90.0], [0.0, 0.0, -1.0], 1e6)
+            .unwrap()
+            .is_none()
+    );
+    assert!(
+        surface
+            .raycast([0.0, 0.0, 90.0], [0.0, 0.0, -2.0], 10.0)
+            .unwrap()
+            .is_none()
+    );
+    assert!(
+        surface
+            .raycast([0.0, 0.0, 90.0], [0.0, 0.0, -2.0], 60.0)
+            .unwrap()
+            .is_some()
+    );
+    assert!(
+        surface
+            .raycast([0.0, 0.0, 90.0], [0.0; 3], 60.0)
+            .unwrap()
+            .is_none()
+    );
+    assert!(
+        surface
+            .raycast([f64::NAN; 3], [1.0, 0.0, 0.0], 60.0)
+            .unwrap()
+            .is_none()
+    );
+}
+
+#[test]
+fn colliders_are_the_surface_where_there_is_one() {
+    let surface = surface();
+    let whole = surface.collider(TileId::new(2, 0, 0), 1).unwrap();
+    assert_eq!(
+        (whole.positions.len(), whole.indices.len()),
+        (129 * 129, 128 * 128 * 6)
+    );
+    for triangle in whole.indices.chunks(3).step_by(97) {
+        let [a, b, c] =
+            [0, 1, 2].map(|corner| whole.positions[triangle[corner] as usize].map(f64::from));
+        let up = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+        assert!(up > 0.0);
+        let middle = [0, 1, 2].map(|axis| whole.origin[axis] + (a[axis] + b[axis] + c[axis]) / 3.0);
+        let height = surface.height_at([middle[0], middle[1]]).unwrap().unwrap();
+        assert!((height - middle[2]).abs() < 1e-4);
+    }
+    let hole = surface.collider(TileId::new(2, 0, 1), 1).unwrap();
+    assert!(hole.indices.len() < whole.indices.len());
+    let border = surface.collider(TileId::new(2, 2, 2), 4).unwrap();
+    assert_eq!(border.indices.len(), 1 * 11 * 6);
+    assert!(
+        surface.collider(TileId::ROOT, 3).is_err()
+            && surface.collider(TileId::new(9, 0, 0), 1).is_err()
+    );
+}
+
+#[test]
+fn the_cache_stays_small() {
+    let source = Synthetic::new(2000, 2000, 1);
+    let count = source.metadata().grid.tiles(source.metadata().finest());
+    let surface = Surface::new(Arc::new(source));
+    for column in 0..count[1] {
+        for row in 0..count[0] {
+            surface
+                .tile(TileId::new(surface.finest(), row, column))
+                .unwrap();
+        }
+    }
+    assert!(surface.kept() <= 128);
+}

@@ -1,0 +1,136 @@
+// draw: the list of indices becomes pictures. A vertex index is a drawn tile and one of its samples.
+// Reads: frame, tiles, pool, imagery; patches and the head of the list where the engine's insides are shown.
+// Entry points: `vertex` (one thread a vertex), `color` and `depth_image` (one thread a pixel).
+// A vertex is placed once, by the tile that owns it. Slopes are looked up per pixel in the samples, never taken from
+// the triangles, so that shading knows no depths.
+// Twin: core/reference/draw.rs
+
+#import constants
+#import frame
+#import pool
+#import border
+#import ground
+#import patch_word
+#import draw_list
+#import colors
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(1) @binding(5) var color_layers: texture_2d_array<f32>;
+@group(1) @binding(6) var color_sampler: sampler;
+@group(2) @binding(0) var<storage, read> patches: array<u32>;
+@group(2) @binding(1) var<storage, read> draw_list: array<u32, DRAW_LIST_WORDS>;
+
+const COLOR_TEXELS: f32 = 256.0;    // a side of a layer; the first and last lie on the tile's border
+
+struct Vertex {
+    @builtin(position) clip: vec4f,
+    @location(0) position: vec3f,   // camera-relative metres
+    @location(1) view_depth: f32,   // metres along the view axis
+    @location(2) @interpolate(flat) tile: u32,
+}
+
+fn vertex_position(index: u32) -> vec3f {
+    let tile = index >> SAMPLE_BITS;
+    let sample = index & ((1u << SAMPLE_BITS) - 1u);
+    var place = vec2u(sample / TILE_SAMPLES, sample % TILE_SAMPLES);
+    var lower = 0.0;
+    if sample >= SKIRT_FIRST {
+        place = skirt_sample(sample - SKIRT_FIRST);
+        lower = tiles[tile].skirt;
+    }
+    let height = pool_height(tiles[tile].slot, place.x * TILE_SAMPLES + place.y);
+    let offset = vec2f(place.yx) * tiles[tile].step;
+    let rise = f32(height - tiles[tile].base) * frame.unit - lower;
+    return tiles[tile].origin + vec3f(offset, rise);
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) index: u32) -> Vertex {
+    let position = vertex_position(index);
+    let clip = frame.clip_from_view_world * vec4f(position, 1.0);
+    return Vertex(clip, position, clip.w, index >> SAMPLE_BITS);
+}
+
+fn imagery(tile: u32, at: vec2f) -> vec3f {
+    let share = at / f32(TILE_CELLS) * tiles[tile].color_scale + tiles[tile].color_offset;
+    let texel = (share * (COLOR_TEXELS - 1.0) + 0.5) / COLOR_TEXELS;
+    return textureSampleLevel(color_layers, color_sampler, texel, tiles[tile].color_slot, 0.0).rgb;
+}
+
+// The depths of the frame were lessened by this.
+fn drawn_shift() -> u32 {
+    for (var shift = 0u; shift < SHIFT_COUNT; shift++) {
+        if draw_list[SHIFT_COUNTS_WORD + shift] <= frame.index_capacity {
+            return shift;
+        }
+    }
+    return 0u;
+}
+
+fn patch_word_at(here: Place) -> u32 {
+    let cell = min(vec2u(here.at) / QUAD_SAMPLES, vec2u(TILE_QUADS - 1u));
+    return patches[here.tile * PATCH_COUNT + cell.y * TILE_QUADS + cell.x];
+}
+
+// 1 on a triangle's edge, 0 a pixel away; `per_pixel` is samples a pixel.
+fn wire(here: Place, per_pixel: vec2f) -> f32 {
+    let word = patch_word_at(here);
+    let shift = drawn_shift();
+    let depth = word_depth(word, shift);
+    let count = 1u << depth;
+    let in_patch = here.at / f32(QUAD_SAMPLES) - floor(here.at / f32(QUAD_SAMPLES));
+    let cell = min(vec2u(in_patch * f32(count)), vec2u(count - 1u));
+    let f = in_patch * f32(count) - vec2f(cell);
+    let scale = per_pixel * f32(count) / f32(QUAD_SAMPLES);
+    let to_side = min(f, 1.0 - f) / scale;
+    let diagonal = length(scale);
+    var nearest = min(min(to_side.x, to_side.y), abs(f.x - f.y) / diagonal);
+    let split = outer_edges(cell.y, cell.x, count) & word_split(word, shift);
+    if split != 0u {
+        nearest = min(nearest, abs(f.x + f.y - 1.0) / diagonal);
+        let vertical = select(EDGE_SOUTH, EDGE_NORTH, f.y < 0.5);
+        let horizontal = select(EDGE_EAST, EDGE_WEST, f.x < 0.5);
+        let to_middle = abs(f - 0.5) / scale;
+        nearest = select(nearest, min(nearest, to_middle.x), (split & vertical) != 0u);
+        nearest = select(nearest, min(nearest, to_middle.y), (split & horizontal) != 0u);
+    }
+    return 1.0 - smoothstep(0.4, 1.2, nearest);
+}
+
+// The ground's colour in the light, before air.
+fn ground_color(here: Place, height: f32) -> vec3f {
+    let slope = ground_slope(here.tile, here.at);
+    let normal = normalize(vec3f(-slope, 1.0));
+    if (frame.flags & FLAG_DEPTH_COLORS) != 0u {
+        let depth = word_depth(patch_word_at(here), drawn_shift());
+        return lit(depth_color(depth, tiles[here.tile].level), normal, frame.sun);
+    }
+    if tiles[here.tile].color_slot != NONE {
+        return softly_lit(imagery(here.tile, here.at), normal, frame.sun);
+    }
+    let range = max(frame.height_range.y - frame.height_range.x, 1.0);
+    let share = (height - frame.height_range.x) / range;
+    return lit(natural_color(share, normal), normal, frame.sun);
+}
+
+@fragment
+fn color(in: Vertex) -> @location(0) vec4f {
+    let per_pixel_metres = max(fwidth(in.position.xy), vec2f(1.0e-9));
+    let here = locate(in.tile, in.position.xy);
+    var result = ground_color(here, in.position.z + frame.camera_height);
+    if (frame.flags & FLAG_WIREFRAME) != 0u {
+        let edge = wire(here, per_pixel_metres / abs(tiles[here.tile].step));
+        result = mix(result, vec3f(0.01), 0.6 * edge);
+    }
+    result = mix(frame.sky, result, exp(-frame.haze * length(in.position)));
+    if (frame.flags & FLAG_SRGB_OUT) != 0u {
+        result = encode_srgb(result);
+    }
+    return vec4f(result, 1.0);
+}
+
+// Metres along the view axis: clip.w of a perspective matrix whose w is the distance.
+@fragment
+fn depth_image(in: Vertex) -> @location(0) f32 {
+    return in.view_depth;
+}
