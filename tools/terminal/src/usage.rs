@@ -25,7 +25,10 @@ pub fn parse<T: Parser>(words: impl IntoIterator<Item = OsString>) -> Result<T, 
 
 /// What clap says before it repeats the usage, and where to read more.
 fn one_line(text: &str) -> String {
-    let text = text.split("\n\nFor more information").next().unwrap_or(text);
+    let text = text
+        .split("\n\nFor more information")
+        .next()
+        .unwrap_or(text);
     let (mistake, rest) = text.split_once("\n\nUsage: ").unwrap_or((text, ""));
     let mistake: Vec<&str> = mistake.split_whitespace().collect();
     let verb: Vec<&str> = rest

@@ -210,3 +210,114 @@ pub(super) fn fingerprint(inputs: &[FeatureInput]) -> String {
 fn to_units(height: f64) -> i32 {
     height as i32
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::path::Path as File;
+    use std::sync::atomic::AtomicBool;
+
+    use super::super::testing::{Field, hills};
+    use super::super::{BuildOptions, build};
+    use super::*;
+    use crate::cage::Placement;
+    use crate::cage::generate::{Arch, Path, arch, flat};
+    use crate::pyramid::{Pyramid, validate};
+
+    /// An arch across the corner of four tiles of 300 × 300 samples.
+    fn input() -> FeatureInput {
+        let path = Path::new(vec![[-250.0, 0.0], [250.0, 50.0]]).unwrap();
+        let lengths = Arch {
+            height: 900.0,
+            width: 100.0,
+        };
+        FeatureInput {
+            name: "arch.obj".into(),
+            cage: arch(&path, &lengths, &flat).unwrap(),
+            placement: Placement::on_ground([1280.0, -1280.0]),
+        }
+    }
+
+    fn make(
+        output: &File,
+        threads: usize,
+        features: Vec<FeatureInput>,
+    ) -> Result<(), PyramidError> {
+        let options = BuildOptions {
+            output: output.into(),
+            threads: Some(threads),
+            features,
+            ..BuildOptions::default()
+        };
+        let raster = Field::new(300, 300, hills);
+        build(&raster, None, &options, &|_| (), &AtomicBool::new(false)).map(|_| ())
+    }
+
+    fn bytes(folder: &File) -> BTreeMap<std::path::PathBuf, Vec<u8>> {
+        let mut all = BTreeMap::new();
+        let mut open = vec![folder.to_path_buf()];
+        while let Some(path) = open.pop() {
+            for entry in std::fs::read_dir(path).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    open.push(path);
+                } else {
+                    let name = path.strip_prefix(folder).unwrap().to_path_buf();
+                    all.insert(name, std::fs::read(&path).unwrap());
+                }
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn a_feature_is_stored_once_felt_above_and_leaves_heights_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let [plain, with, again] = ["plain", "with", "again"].map(|name| folder.path().join(name));
+        make(&plain, 2, Vec::new()).unwrap();
+        make(&with, 1, vec![input()]).unwrap();
+        make(&again, 3, vec![input()]).unwrap();
+        assert!(bytes(&with) == bytes(&again));
+        let report = validate(&with, true, &mut |_, _| ()).unwrap();
+        assert!(report.is_valid(), "{:?}", report.findings);
+        let [plain, with] = [plain, with].map(|path| Pyramid::open(&path).unwrap());
+        let about = with.metadata().features.unwrap();
+        assert_eq!((about.level, about.groups), (2, 1));
+        let home = TileId::new(2, 0, 0);
+        let groups = with.read_features(home).unwrap();
+        assert_eq!((groups[0].home, groups[0].tiles.len()), (home, 4));
+        assert!(groups[0].cage.is_some());
+        for &tile in &groups[0].tiles {
+            let [before, after] = [&plain, &with].map(|from| from.read_tile_chain(tile).unwrap());
+            assert_eq!(
+                (before.controls, before.detail),
+                (after.controls, after.detail)
+            );
+            assert!(after.summary.flags & Summary::FEATURE != 0);
+            assert_eq!(after.summary.error, before.summary.error);
+            assert!(f64::from(after.summary.max) * with.metadata().unit() > 850.0);
+            assert_eq!(
+                with.read_features(tile).unwrap()[0].cage.is_some(),
+                tile == home
+            );
+        }
+        assert!(with.read_features(TileId::new(2, 2, 2)).unwrap().is_empty());
+        assert!(
+            plain.metadata().features.is_none() && plain.read_features(home).unwrap().is_empty()
+        );
+        for level in 0..2 {
+            let tile = with.read_tile_chain(home.ancestor(level)).unwrap();
+            assert!(tile.summary.error > 600.0, "{}", tile.summary.error);
+        }
+    }
+
+    #[test]
+    fn a_feature_that_cannot_be_laid_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut outside = input();
+        outside.placement.position = [1e7, 0.0];
+        assert!(make(&folder.path().join("x"), 1, vec![outside]).is_err());
+        assert!(make(&folder.path().join("x"), 1, vec![input(), input()]).is_err());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}
