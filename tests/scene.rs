@@ -359,6 +359,7 @@ impl HillSource {
             height_range: [-400, 3440],
             levels: (0..grid.level_count()).map(level).collect(),
             color: None,
+            features: None,
             sources: Vec::new(),
         };
         Self {

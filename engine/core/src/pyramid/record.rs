@@ -214,9 +214,9 @@ fn check_summary(summary: &Summary, whose: &str) -> Result<(), String> {
     if !(error.is_finite() && error >= 0.0) {
         return Err(format!("{whose}'s error is {error} m"));
     }
-    if flags & !(Summary::PRESENT | Summary::VOID | Summary::ALL_VOID) != 0 {
+    if flags & !(Summary::PRESENT | Summary::VOID | Summary::ALL_VOID | Summary::FEATURE) != 0 {
         return Err(format!(
-            "{whose}'s flags are {flags:#x}, of which this version knows 0x7"
+            "{whose}'s flags are {flags:#x}, of which this version knows 0xf"
         ));
     }
     Ok(())

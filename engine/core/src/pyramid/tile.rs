@@ -25,7 +25,7 @@ impl Summary {
     pub const VOID: u32 = 2;
     /// Every sample is void.
     pub const ALL_VOID: u32 = 4;
-    /// A feature stands in the place of some patches.
+    /// A feature is laid into some of its patches.
     pub const FEATURE: u32 = 8;
 
     /// True when the pyramid has this tile.

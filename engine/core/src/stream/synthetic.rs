@@ -61,6 +61,7 @@ impl Synthetic {
             height_range: [0, 1600],
             levels: (0..grid.level_count()).map(level).collect(),
             color: None,
+            features: None,
             sources: Vec::new(),
         };
         Self {

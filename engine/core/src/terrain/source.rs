@@ -11,7 +11,10 @@ use std::{
 
 use crate::{
     geo::TileId,
-    pyramid::{MappedStore, Metadata, Pyramid, PyramidError, Store, StoreError, Tile},
+    pyramid::{
+        MappedStore, Metadata, Pyramid, PyramidError, Store, StoreError, Tile,
+        feature::FeatureGroup,
+    },
     stream::TileSource,
 };
 
@@ -69,6 +72,14 @@ impl TileSource for PyramidSource {
 
     fn load_color(&self, id: TileId) -> Result<Option<Arc<[u8]>>, PyramidError> {
         Ok(self.pyramid.read_color(id)?.map(Into::into))
+    }
+
+    fn has_features(&self) -> bool {
+        self.metadata().features.is_some()
+    }
+
+    fn load_features(&self, id: TileId) -> Result<Vec<FeatureGroup>, PyramidError> {
+        self.pyramid.read_features(id)
     }
 
     fn bytes_read(&self) -> u64 {
