@@ -492,7 +492,7 @@ fn a_feature_is_drawn_exactly_when_its_tiles_are_finest_and_its_mesh_is_up() {
     let mut planner = Planner::new(Arc::clone(&source), PlannerDescriptor::default()).unwrap();
     let (mut up, mut drawn, mut ground) = (HashMap::new(), 0, 0);
     for step in 0..400 {
-        let distance = 30.0 + 300.0 * (f64::from(step) / 60.0).sin().abs();
+        let distance = 30.0 + 1500.0 * (f64::from(step) / 60.0).sin().abs();
         let view = at_arch(&planner, distance);
         let (plan, stats) = planner.plan(&view);
         assert_features(&plan, &mut up, finest);
@@ -514,7 +514,7 @@ fn a_plan_that_waits_has_its_features_and_nearer_ones_are_finer() {
     let finest = planner.tree.finest();
     let mut up = HashMap::new();
     let mut indices = Vec::new();
-    for distance in [60.0, 15.0] {
+    for distance in [250.0, 15.0] {
         let view = at_arch(&planner, distance);
         let (plan, _) = planner.plan(&view);
         assert_features(&plan, &mut up, finest);
