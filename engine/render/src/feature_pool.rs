@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use drumlin_core::terrain::{FeatureDraw, FeatureUpload, FramePlan};
 
-/// Bytes of a feature's place before its tiles.
+/// Bytes of a feature's place before its tiles; its whole is a multiple of them.
 const PLACE_BYTES: u64 = 16;
 
 /// One feature's mesh and place.
@@ -82,7 +82,7 @@ impl FeatureBuffers {
         layout: &wgpu::BindGroupLayout,
         draw: &FeatureDraw,
     ) {
-        let size = PLACE_BYTES + 4 * draw.tiles.len().max(1) as u64;
+        let size = PLACE_BYTES + (4 * draw.tiles.len().max(1) as u64).next_multiple_of(PLACE_BYTES);
         if self.place.as_ref().is_none_or(|place| place.size() < size) {
             let place = buffer(device, size, wgpu::BufferUsages::STORAGE);
             self.bindings = Some(bind(device, layout, &self.vertices, &place));
