@@ -2,10 +2,7 @@
 
 use std::{fs, path::Path};
 
-use drumlin_core::{
-    dem,
-    geo::Grid,
-};
+use drumlin_core::{dem, geo::Grid};
 use serde_json::{Value, json};
 
 use crate::support::{drumlin_ok, folder, has_gpu, rainier, rainier_pyramid};
