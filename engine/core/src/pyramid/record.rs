@@ -365,7 +365,7 @@ mod tests {
             (12, i32::MAX.to_le_bytes()),
             (20, f32::NAN.to_le_bytes()),
             (20, (-1_f32).to_le_bytes()),
-            (24, 8_u32.to_le_bytes()),
+            (24, 16_u32.to_le_bytes()),
             (0, 256_u32.to_le_bytes()),
         ] {
             let mut broken = bytes.clone();

@@ -52,8 +52,13 @@ fn format_lines() -> String {
     rest.split_once("```").unwrap().0.to_owned()
 }
 
+/// The Python that `cargo verify` sets up, else the one on the path.
+fn python() -> std::ffi::OsString {
+    env::var_os("DRUMLIN_PYTHON").unwrap_or_else(|| "python3".into())
+}
+
 fn has_zarr() -> bool {
-    let import = Command::new("python3")
+    let import = Command::new(python())
         .args(["-c", "import zarr; assert zarr.__version__ >= '3'"])
         .output();
     import.is_ok_and(|output| output.status.success())
@@ -88,7 +93,7 @@ fn zarr_python_reads_the_heights_we_read() {
     let script = folder.path().join("compare.py");
     fs::write(&script, format_lines() + COMPARE).unwrap();
     let rule = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/reference/tile");
-    let output = Command::new("python3")
+    let output = Command::new(python())
         .arg(&script)
         .arg(folder.path())
         .arg(rule)

@@ -4,6 +4,11 @@
 //! with one open rim that lies on the ground, faces counter-clockwise seen from above, creases where edges are to stay
 //! edges. Metres east, north and up. Knows no terrain beyond a function that answers for heights.
 
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "a path has at most 20,000 stations, a section a few vertices"
+)]
+
 mod arch;
 mod cliff;
 mod path;

@@ -219,6 +219,7 @@ fn worst_cosine(corners: [Point; 4]) -> Option<f64> {
 }
 
 #[cfg(test)]
+#[expect(clippy::cast_possible_truncation, reason = "small numbers")]
 mod tests {
     use super::super::plan::area;
     use super::*;
