@@ -1,11 +1,13 @@
 //! An arch of stone in the ground, streamed and drawn: no gap along its border, daylight under it.
 
-use std::sync::Arc;
+use std::{ffi::OsString, sync::Arc};
 
 use drumlin::{
     Headless, Look, Offscreen, Pace, Terrain, TerrainDescriptor, TerrainSource, View, wgpu,
 };
 use drumlin_tests::scene::HillSource;
+
+use crate::support::{drumlin_ok, folder, rainier};
 
 const SIZE: [u32; 2] = [640, 360];
 
@@ -148,4 +150,54 @@ fn engine_colours_show_the_arch_too_and_far_away_its_ground_is_drawn() {
     let view = View::looking_at([9000.0, -9000.0, 3000.0], target, 0.8, SIZE);
     let (features, _) = draw(&gpu, &mut terrain, "arch_far.png", &view);
     assert_eq!(features, 0);
+}
+
+/// The features of the assets, built into Mt Rainier by the command that builds them.
+#[test]
+fn authored_features_are_built_streamed_and_drawn_without_gaps() {
+    let Some(gpu) = drumlin_tests::gpu() else {
+        return;
+    };
+    let folder = folder("features");
+    let path = folder.join("features.zarr");
+    let assets = rainier();
+    let assets = assets.parent().expect("a folder");
+    let files = ["arch", "cliff", "road"].map(|name| assets.join(format!("rainier_{name}.obj")));
+    let mut arguments: Vec<OsString> = vec!["build".into(), rainier().into(), "-o".into()];
+    arguments.extend([path.clone().into(), "--features".into()]);
+    arguments.extend(files.map(OsString::from));
+    drumlin_ok(&arguments);
+    let mut terrain = Terrain::new(
+        &gpu.device,
+        &gpu.queue,
+        TerrainDescriptor {
+            pace: Pace::Complete,
+            ..TerrainDescriptor::at(&path)
+        },
+    )
+    .expect("a terrain");
+    let [a, b] = terrain.world_from_crs();
+    for (name, [x, y]) in [
+        ("arch", [-121.67, 46.92]),
+        ("cliff", [-121.835, 46.92]),
+        ("road", [-121.67, 46.6]),
+    ] {
+        let place = [a[0] * x + a[1] * y + a[2], b[0] * x + b[1] * y + b[2]];
+        let z = terrain.height_at(place).expect("read").expect("ground");
+        for (at, [east, north, up]) in [[0.0, -900.0, 2200.0], [1500.0, 1800.0, 1500.0]]
+            .into_iter()
+            .enumerate()
+        {
+            let eye = [place[0] + east, place[1] + north, z + up];
+            let view = View::looking_at(eye, [place[0], place[1], z - 200.0], 0.6, SIZE);
+            let (features, distances) =
+                draw(&gpu, &mut terrain, &format!("{name}_{at}.png"), &view);
+            assert!(features > 0, "{name} {at}");
+            let holes = distances
+                .iter()
+                .filter(|distance| distance.is_infinite())
+                .count();
+            assert_eq!(holes, 0, "{name} {at}");
+        }
+    }
 }

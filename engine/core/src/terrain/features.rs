@@ -20,9 +20,12 @@ use super::{
     mesher::{MeshJob, Mesher, ReadyMesh, ShapeParts, Source},
 };
 use crate::{
-    geo::{QUAD_SAMPLES, TILE_QUADS, TileId},
+    geo::TileId,
     pyramid::{PyramidError, Tile, feature::FeatureGroup},
-    reference::shared::TILE_CUT,
+    reference::shared::{
+        TILE_CUT,
+        border::{QUAD_SAMPLES, TILE_QUADS},
+    },
     stream::{Drawn, Tree, View},
 };
 
@@ -156,23 +159,23 @@ impl FeaturePool {
             group.seen = Some((view.eye, pixels_per_radian));
             let source = match &group.shape {
                 Some(shape) => Source::Shape(Arc::clone(shape)),
-                None => Source::Parts(ShapeParts {
+                None => Source::Parts(Box::new(ShapeParts {
                     place: cut_place(candidate.group.cut, tree, self.unit),
                     group: candidate.group.clone(),
                     tiles: candidate.tiles.clone(),
-                }),
+                })),
             };
             let depths = group
                 .mesh
                 .as_ref()
                 .map_or_else(Arc::default, |mesh| Arc::clone(&mesh.depths));
-            self.mesher.start(MeshJob {
+            self.mesher.start(Box::new(MeshJob {
                 feature: *id,
                 source,
                 eye: view.eye,
                 pixels_per_radian,
                 depths,
-            });
+            }));
             return;
         }
     }
@@ -352,7 +355,7 @@ fn candidates(plan: &FramePlan, tree: &Tree, drawn: &Drawn) -> BTreeMap<u32, Can
 fn cut_place(cut: [u32; 4], tree: &Tree, unit: f64) -> CutPlace {
     let first = TileId::new(tree.finest(), 0, 0);
     let ([x, y], step) = tree.corner_and_step(first);
-    let [row, column] = [cut[0], cut[1]].map(|patch| f64::from(patch) * QUAD_SAMPLES as f64);
+    let [row, column] = [cut[0], cut[1]].map(|patch| f64::from(patch * QUAD_SAMPLES));
     CutPlace {
         cut,
         corner: [x + column * step[0], y + row * step[1]],
@@ -366,13 +369,12 @@ pub(super) fn cut_bits(id: TileId, features: &[FeatureGroup]) -> Option<Box<[u32
     if features.is_empty() {
         return None;
     }
-    let quads = TILE_QUADS as u32;
     let mut bits = Box::new([0; 32]);
     for group in features {
         let [row0, column0, row1, column1] = group.cut;
         let part = |from: u32, to: u32, tile: u32| {
-            let first = tile * quads;
-            from.saturating_sub(first).min(quads)..to.saturating_sub(first).min(quads)
+            let first = tile * TILE_QUADS;
+            from.saturating_sub(first).min(TILE_QUADS)..to.saturating_sub(first).min(TILE_QUADS)
         };
         for row in part(row0, row1, id.row) {
             for column in part(column0, column1, id.column) {

@@ -15,9 +15,9 @@ use crossbeam::channel::{Receiver, Sender, bounded};
 use super::feature_mesh::{CutPlace, FeatureShape};
 use crate::{
     cage::Cage,
-    geo::{TILE_CELLS, TILE_SAMPLES, TileId},
+    geo::{TILE_SAMPLES, TileId},
     pyramid::{PyramidError, Tile, feature::FeatureGroup, surface},
-    reference::shared::FeatureVertex,
+    reference::shared::{FeatureVertex, border::TILE_CELLS},
 };
 
 /// What a shape is made from: the group, its cage, and its tiles in the group's order.
@@ -32,7 +32,7 @@ pub(super) struct ShapeParts {
 #[derive(Clone, Debug)]
 pub(super) enum Source {
     /// Nothing is made yet.
-    Parts(ShapeParts),
+    Parts(Box<ShapeParts>),
     /// The shape is there.
     Shape(Arc<FeatureShape>),
 }
@@ -75,7 +75,7 @@ pub(super) struct Meshed {
 /// The thread and the channels to it.
 #[derive(Debug)]
 pub(super) struct Mesher {
-    jobs: Option<Sender<MeshJob>>,
+    jobs: Option<Sender<Box<MeshJob>>>,
     answers: Receiver<Meshed>,
     thread: Option<JoinHandle<()>>,
     is_busy: bool,
@@ -105,7 +105,7 @@ impl Mesher {
     }
 
     /// Starts a job; nothing may be under way.
-    pub(super) fn start(&mut self, job: MeshJob) {
+    pub(super) fn start(&mut self, job: Box<MeshJob>) {
         let sent = self.jobs.as_ref().map(|jobs| jobs.try_send(job));
         self.is_busy = matches!(sent, Some(Ok(())));
     }
@@ -132,7 +132,7 @@ impl Drop for Mesher {
     }
 }
 
-fn work(jobs: &Receiver<MeshJob>, answers: &Sender<Meshed>) {
+fn work(jobs: &Receiver<Box<MeshJob>>, answers: &Sender<Meshed>) {
     for job in jobs {
         let feature = job.feature;
         // A panic is a bug of ours; it costs a feature and not the flight.
@@ -198,9 +198,8 @@ pub(super) fn shape<'a>(
         .collect();
     let level = heights.keys().next().map_or(0, |id| id.level);
     FeatureShape::new(cage, place, |sample| {
-        let cells = TILE_CELLS as u32;
-        let [row, column] = sample.map(|at| at / cells);
-        let inside = sample.map(|at| (at % cells) as usize);
+        let [row, column] = sample.map(|at| at / TILE_CELLS);
+        let inside = sample.map(|at| (at % TILE_CELLS) as usize);
         heights
             .get(&TileId::new(level, row, column))
             .map_or(0, |heights| heights[inside[0] * TILE_SAMPLES + inside[1]])

@@ -40,7 +40,7 @@ pub struct Updater {
 
 #[derive(Debug)]
 enum Pace {
-    Stepped(Box<Maker>, Option<FramePlan>),
+    Stepped(Box<Maker>, Option<Box<FramePlan>>),
     Paced(Option<Worker>),
 }
 
@@ -140,7 +140,7 @@ impl Updater {
         };
         match &mut self.pace {
             Pace::Stepped(maker, spare) => {
-                Some(maker.make(order, spare.take().unwrap_or_default()))
+                Some(maker.make(order, *spare.take().unwrap_or_default()))
             }
             Pace::Paced(worker) => {
                 let worker = worker.as_ref()?;
@@ -158,7 +158,7 @@ impl Updater {
     /// Gives back the memory of a plan that is no longer drawn.
     pub fn recycle(&mut self, plan: FramePlan) {
         match &mut self.pace {
-            Pace::Stepped(_, spare) => *spare = Some(plan),
+            Pace::Stepped(_, spare) => *spare = Some(Box::new(plan)),
             Pace::Paced(Some(worker)) => {
                 // When there is enough of it already, it goes.
                 let _ = worker.spare.try_send(plan);

@@ -391,15 +391,15 @@ fn cut_patches_leave_a_hole_whose_border_has_every_sample_at_any_shift() {
     let mut state = 3;
     let scene = quarters(&[], &[]);
     // Rows 5 to 11 and columns 28 to 35 of patches: across the border of two tiles.
-    let in_cut = |at: usize| {
-        let (tile, patch) = (at as u32 / PATCH_COUNT, at as u32 % PATCH_COUNT);
+    let in_cut = |at: u32| {
+        let (tile, patch) = (at / PATCH_COUNT, at % PATCH_COUNT);
         let row = tile / 2 * TILE_QUADS + patch / TILE_QUADS;
         let column = tile % 2 * TILE_QUADS + patch % TILE_QUADS;
         (5..12).contains(&row) && (28..36).contains(&column)
     };
     for kind in 0..3 {
         let mut depths = random_depths(scene.tiles.len(), kind, &mut state);
-        for (at, depth) in depths.iter_mut().enumerate() {
+        for (at, depth) in (0..).zip(&mut depths) {
             if in_cut(at) {
                 *depth = FINEST_DEPTH | DEPTH_CUT;
             }

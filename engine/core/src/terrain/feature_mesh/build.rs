@@ -17,8 +17,7 @@ use std::collections::HashMap;
 use super::{FeatureMesh, FeatureShape};
 use crate::{
     fas::{Cap, Patch, Place, Sample, Tables},
-    geo::TILE_SAMPLES,
-    reference::shared::{NONE, SAMPLE_BITS},
+    reference::shared::{NONE, SAMPLE_BITS, border::TILE_SAMPLES},
 };
 
 /// A face's side in the fixed steps that places are counted in: finer than any cell of the greatest depth.
@@ -196,10 +195,7 @@ impl Builder<'_> {
             let rise = f64::from(shape.height([x, y])) * cut.unit - shape.origin[2];
             sample.position = [f64::from(x) * cut.step[0], f64::from(y) * cut.step[1], rise];
             let (tile, [row, column]) = cut.tile_at([start[0] + y, start[1] + x]);
-            (
-                tile,
-                tile << SAMPLE_BITS | (row * TILE_SAMPLES as u32 + column),
-            )
+            (tile, tile << SAMPLE_BITS | (row * TILE_SAMPLES + column))
         } else {
             (self.tile_under(sample.position), NONE)
         };

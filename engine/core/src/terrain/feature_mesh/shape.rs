@@ -5,8 +5,8 @@ use super::{FeatureMesh, border::Border, build};
 use crate::{
     cage::{Cage, NONE, Topology, refine},
     fas::{DepthRule, Features, Tables},
-    geo::{QUAD_SAMPLES, TILE_CELLS},
     pyramid::PyramidError,
+    reference::shared::border::{QUAD_SAMPLES, TILE_CELLS},
 };
 
 /// Where a cut lies.
@@ -26,26 +26,21 @@ impl CutPlace {
     /// Samples from west to east and from north to south.
     #[must_use]
     pub fn size(&self) -> [u32; 2] {
-        let quad = QUAD_SAMPLES as u32;
-        [
-            (self.cut[3] - self.cut[1]) * quad,
-            (self.cut[2] - self.cut[0]) * quad,
-        ]
+        [[1, 3], [0, 2]].map(|[from, to]| (self.cut[to] - self.cut[from]) * QUAD_SAMPLES)
     }
 
     /// The finest sample (row, column) of the cut's north-west corner.
     #[must_use]
     pub fn first_sample(&self) -> [u32; 2] {
-        [self.cut[0], self.cut[1]].map(|patch| patch * QUAD_SAMPLES as u32)
+        [self.cut[0], self.cut[1]].map(|patch| patch * QUAD_SAMPLES)
     }
 
     /// The place in the group's list of the tile at a finest sample (row, column), and the sample's row and column there.
     pub(super) fn tile_at(&self, sample: [u32; 2]) -> (u32, [u32; 2]) {
-        let cells = TILE_CELLS as u32;
-        let first = self.first_sample().map(|sample| sample / cells);
-        let last = [0, 1].map(|axis| (self.cut[axis + 2] * QUAD_SAMPLES as u32 - 1) / cells);
-        let tile = [0, 1].map(|axis| (sample[axis] / cells).clamp(first[axis], last[axis]));
-        let inside = [0, 1].map(|axis| sample[axis] - tile[axis] * cells);
+        let first = self.first_sample().map(|sample| sample / TILE_CELLS);
+        let last = [0, 1].map(|axis| (self.cut[axis + 2] * QUAD_SAMPLES - 1) / TILE_CELLS);
+        let tile = [0, 1].map(|axis| (sample[axis] / TILE_CELLS).clamp(first[axis], last[axis]));
+        let inside = [0, 1].map(|axis| sample[axis] - tile[axis] * TILE_CELLS);
         let place = (tile[0] - first[0]) * (last[1] - first[1] + 1) + tile[1] - first[1];
         (place, inside)
     }
@@ -254,7 +249,7 @@ fn sample_on_border(at: [f64; 2], size: [u32; 2]) -> Option<[u32; 2]> {
 /// For every face of the refined cage: true when its parent is a lattice quad at the border of the cut.
 fn ring_faces(laid: &Cage, size: [u32; 2]) -> Vec<bool> {
     let topology = laid.topology();
-    let quad = QUAD_SAMPLES as f64;
+    let quad = f64::from(QUAD_SAMPLES);
     let is_ring = |face: u32| {
         let corners = topology.face_vertices(face);
         if corners.len() != 4 || topology.is_hole(face) {
