@@ -186,7 +186,7 @@ mod tests {
             .map(|[_, _, z]| z)
             .collect();
         assert!(
-            heights.iter().all(|&z| z < 30.0 || z > 330.0),
+            heights.iter().all(|z| !(30.0..=330.0).contains(z)),
             "{heights:?}"
         );
         assert!(heights.iter().any(|&z| z > 400.0));

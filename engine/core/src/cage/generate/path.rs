@@ -79,7 +79,7 @@ impl Path {
     /// [`CageError::Shape`] where there would be too many.
     pub fn stations(&self, step: f64, least: u32) -> Result<Vec<f64>, CageError> {
         let count = (self.length() / step).ceil().max(f64::from(least) - 1.0);
-        if !(count <= STATION_LIMIT) {
+        if count.is_nan() || count > STATION_LIMIT {
             return Err(CageError::Shape(format!(
                 "a path of {} m in steps of {step} m; {STATION_LIMIT} steps are the limit",
                 self.length()

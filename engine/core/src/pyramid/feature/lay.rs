@@ -75,7 +75,10 @@ fn place(input: &FeatureInput, site: &Site<'_>) -> Result<Vec<[f64; 3]>, String>
 fn cut(placed: &[[f64; 3]], site: &Site<'_>) -> Result<[u32; 4], String> {
     let mut cut = [0; 4];
     for (axis, count) in [site.grid.rows, site.grid.columns].into_iter().enumerate() {
-        let along = placed.iter().map(|place| place[1 - axis] / SIDE);
+        // Snapped as the rim will be, so that a rim on a lattice line counts as in both patches here and there.
+        let along = placed
+            .iter()
+            .map(|place| (place[1 - axis] * PLAN_STEPS).round() / PLAN_STEPS / SIDE);
         let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
             (low.min(x), high.max(x))
         });
@@ -92,7 +95,10 @@ fn cut(placed: &[[f64; 3]], site: &Site<'_>) -> Result<[u32; 4], String> {
         if !(low > -1e6 && high < 1e9) {
             return Err(outside());
         }
-        let (mut first, mut end) = (whole(low.floor()) - MARGIN, whole(high.ceil()) + MARGIN);
+        let (mut first, mut end) = (
+            whole(low.floor()) - MARGIN,
+            whole(high.floor()) + 1 + MARGIN,
+        );
         // A cut that ended on a tile's border would change a border vertex of a tile that has nothing of it.
         let quads = TILE_QUADS as i64;
         first -= i64::from(first.rem_euclid(quads) == 0);

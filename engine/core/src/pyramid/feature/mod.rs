@@ -187,6 +187,7 @@ pub(in crate::pyramid) fn tiles_of(
     level: u8,
     [row0, column0, row1, column1]: [u32; 4],
 ) -> Vec<TileId> {
+    #[expect(clippy::cast_possible_truncation, reason = "32")]
     let quads = TILE_QUADS as u32;
     let span = |first: u32, end: u32| first / quads..end.saturating_sub(1) / quads + 1;
     span(row0, row1)

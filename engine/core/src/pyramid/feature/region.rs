@@ -104,7 +104,9 @@ impl Region {
             let across = |y: f64| {
                 let part = (y - top[1]) / (bottom[1] - top[1]);
                 if part.is_finite() {
-                    top[0] + (bottom[0] - top[0]) * part
+                    // Rounding must not lead past an end that lies on a lattice line.
+                    let [west, east] = [top[0].min(bottom[0]), top[0].max(bottom[0])];
+                    (top[0] + (bottom[0] - top[0]) * part).clamp(west, east)
                 } else {
                     top[0]
                 }
