@@ -11,8 +11,10 @@ use drumlin_core::{
         balance, decode, depth, emit,
         shared::{
             CODES_WORD, DRAW_LIST_WORDS, DrawnTile, Frame, HEIGHTS_WORD, INDEX_COUNT_WORD, NONE,
-            SLOPES_WORD, SLOT_WORDS, STRIDE_ERRORS_WORD, TILE_VOIDS, UPLOAD_WORDS, UploadHeader,
-            VOIDS_WORD, pool::unpack_2x16_float,
+            SLOPES_WORD, SLOT_WORDS, STRIDE_ERRORS_WORD, TILE_CUT, TILE_VOIDS, UPLOAD_CUT_WORD,
+            UPLOAD_WORDS, UploadHeader, VOIDS_WORD,
+            patch_word::{DEPTH_CUT, FINEST_DEPTH, PATCH_CUT},
+            pool::unpack_2x16_float,
         },
     },
     terrain::FramePlan,
@@ -107,6 +109,9 @@ fn decoded(plan: &FramePlan) -> Vec<u32> {
     let mut headers = Vec::new();
     for (upload, words) in plan.uploads.iter().zip(staging.chunks_mut(UPLOAD_WORDS)) {
         decode::stage_tile(&upload.tile, words);
+        if let Some(cut) = &upload.cut {
+            words[UPLOAD_CUT_WORD..].copy_from_slice(&cut[..]);
+        }
         headers.push(UploadHeader {
             slot: upload.slot,
             quantum: upload.tile.step,
@@ -176,7 +181,11 @@ fn assert_depths_agree(device: &[u32], reference: &[u32]) {
         "{different} of {} depths differ",
         reference.len()
     );
-    assert!(device.iter().all(|depth| *depth <= 2));
+    assert!(
+        device
+            .iter()
+            .all(|depth| *depth <= 2 || *depth == FINEST_DEPTH | DEPTH_CUT)
+    );
 }
 
 /// Triangles in an order of their own, each as it was written.
@@ -266,6 +275,40 @@ fn every_stage_does_what_its_reference_does() {
         plan.frame = Some(frame);
         let made = make(&gpu, &mut renderer, &plan, slots);
         assert_stages_agree(&made, &completed(&frame, &renderer), &plan.drawn);
+    }
+}
+
+/// Patches of rows 4 to 11 and columns 6 to 13 of a finest tile are cut: holes whose border is at stride 1, also when the
+/// whole list is drawn a depth coarser.
+#[test]
+fn cut_patches_are_left_out_alike_on_both_sides() {
+    let Some(gpu) = drumlin_tests::gpu() else {
+        return;
+    };
+    let mut renderer = renderer(&gpu);
+    let mut plan = scene::plan(&Camera::over_the_hill(SIZE), &scene::mixed_cut());
+    let at = plan.drawn.len() - 1;
+    let mut cut = Box::new([0; 32]);
+    cut[4..12].fill(0xff << 6);
+    plan.drawn[at].flags |= TILE_CUT;
+    let slot = plan.drawn[at].slot;
+    let upload = plan.uploads.iter_mut().find(|upload| upload.slot == slot);
+    upload.expect("it is there").cut = Some(cut);
+    let slots = plan.uploads.len();
+    for uniform in [NONE, 0, 2] {
+        let frame = Frame {
+            uniform_depth: uniform,
+            ..plan.frame.expect("a frame")
+        };
+        plan.frame = Some(frame);
+        let made = make(&gpu, &mut renderer, &plan, slots);
+        if !plan.uploads.is_empty() {
+            assert_decoded_alike(&made.page, &decoded(&plan));
+        }
+        assert_stages_agree(&made, &completed(&frame, &renderer), &plan.drawn);
+        let is_cut = |word: &&u32| **word & PATCH_CUT != 0;
+        assert_eq!(made.patches.iter().filter(is_cut).count(), 64);
+        plan.uploads.clear();
     }
 }
 

@@ -1,6 +1,7 @@
 //! End-to-end tests, one binary.
 
 mod commands;
+mod features;
 mod flight;
 mod gpu_parity;
 mod layers;

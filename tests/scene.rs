@@ -9,12 +9,14 @@ use drumlin_core::{
         CAGE_CONTROL_COUNT, CAGE_CONTROLS, Crs, Grid, PATCH_COUNT, QUAD_SAMPLES, TILE_CELLS,
         TILE_SAMPLE_COUNT, TILE_SAMPLES, TileId,
     },
-    pyramid::{Level, Metadata, PyramidError, Summary, Tile, VerticalReference},
+    pyramid::{
+        Level, Metadata, PyramidError, Summary, Tile, VerticalReference, feature::FeatureGroup,
+    },
     reference::shared::{
         DrawnTile, Frame, NONE, SIDE_COARSER, SIDE_FINER, SIDE_SAME, TILE_VISIBLE,
     },
     stream::TileSource,
-    terrain::{FramePlan, Upload},
+    terrain::{FramePlan, Upload, feature_mesh::synthetic},
 };
 
 /// Metres a height unit of the scene.
@@ -195,14 +197,15 @@ pub fn plan(camera: &Camera, cut: &[TileId]) -> FramePlan {
         slot: u32::try_from(slot).expect("few slots"),
         tile: Arc::new(tile(id)),
         step: metric_step(id.level),
+        cut: None,
     };
     FramePlan {
         uploads: resident.iter().enumerate().map(upload).collect(),
         color_uploads: Vec::new(),
         frame: Some(frame(camera, cut.len())),
         drawn: drawn_tiles(camera, cut, &resident),
-        places: Vec::new(),
         ground: [[f64::MIN; 2], [f64::MAX; 2]],
+        ..FramePlan::default()
     }
 }
 
@@ -325,6 +328,7 @@ fn corner_owner(places: &HashMap<TileId, u32>, id: TileId, corner: u32) -> (u32,
 pub struct HillSource {
     metadata: Metadata,
     delay: Duration,
+    arch: Option<FeatureGroup>,
 }
 
 /// Geometric errors of the levels, metres: generous, and none at the finest.
@@ -358,9 +362,42 @@ impl HillSource {
             height_range: [-400, 3440],
             levels: (0..grid.level_count()).map(level).collect(),
             color: None,
+            features: None,
             sources: Vec::new(),
         };
-        Self { metadata, delay }
+        Self {
+            metadata,
+            delay,
+            arch: None,
+        }
+    }
+
+    /// The same hill with an arch of stone on its north-west side, across the border of two tiles.
+    #[must_use]
+    pub fn with_arch() -> Self {
+        let [row, column, ..] = synthetic::arch_place(step(2), UNIT.into()).cut;
+        let metres = |patch: u32, point: i32| {
+            f64::from(patch.cast_signed() + point) * QUAD_SAMPLES as f64 * step(2)
+        };
+        let control = |down: i32, right: i32| {
+            (ground(metres(column, right), metres(row, down)) / f64::from(UNIT)).round()
+        };
+        let tiles: Vec<_> = (0..2).map(|column| TileId::new(2, 0, column)).collect();
+        let arch = FeatureGroup {
+            id: 0,
+            home: tiles[0],
+            tiles,
+            cut: synthetic::arch_place(step(2), UNIT.into()).cut,
+            cage: Some(synthetic::arch_cage(560.0, control)),
+        };
+        Self {
+            arch: Some(arch),
+            ..Self::new(Duration::ZERO)
+        }
+    }
+
+    fn arch_at(&self, id: TileId) -> Option<&FeatureGroup> {
+        self.arch.as_ref().filter(|arch| arch.tiles.contains(&id))
     }
 
     fn summary(&self, id: TileId) -> Summary {
@@ -372,7 +409,12 @@ impl HillSource {
             min: -800,
             max: 4000,
             error,
-            flags: Summary::PRESENT,
+            flags: Summary::PRESENT
+                | if self.arch_at(id).is_some() {
+                    Summary::FEATURE
+                } else {
+                    0
+                },
         }
     }
 }
@@ -390,5 +432,17 @@ impl TileSource for HillSource {
             children,
             ..tile(id)
         })
+    }
+
+    fn has_features(&self) -> bool {
+        self.arch.is_some()
+    }
+
+    fn load_features(&self, id: TileId) -> Result<Vec<FeatureGroup>, PyramidError> {
+        let mut arch = self.arch_at(id).cloned();
+        if let Some(arch) = arch.as_mut().filter(|arch| arch.home != id) {
+            arch.cage = None;
+        }
+        Ok(arch.into_iter().collect())
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use drumlin_core::{
     geo,
-    reference::shared::{self, DrawnTile, Frame, UploadHeader, border, patch_word},
+    reference::shared::{self, DrawnTile, FeatureVertex, Frame, UploadHeader, border, patch_word},
 };
 use naga::{Expression, Literal, Module, TypeInner};
 
@@ -62,11 +62,13 @@ fn structs_have_one_layout_on_both_sides() {
         color_slot, color_scale, color_offset, skirt, geometric_error, corner_tile, corner_sample, side_north,
         side_east, side_south, side_west);
     let upload = fields!(UploadHeader: slot, quantum, unit, reserved, step, reserved_2);
+    let vertex = fields!(FeatureVertex: position, tile, normal, reserved);
     let modules = modules();
     for (name, rust) in [
         ("Frame", frame),
         ("DrawnTile", tile),
         ("UploadHeader", upload),
+        ("FeatureVertex", vertex),
     ] {
         let found: Vec<_> = modules
             .iter()
@@ -107,11 +109,12 @@ fn constants_are_equal_on_both_sides() {
             CAGE_CONTROL_COUNT;
         border: TILE_QUADS, QUAD_SAMPLES, TILE_CELLS, TILE_SAMPLES, PATCH_COUNT, EDGE_NORTH, EDGE_EAST, EDGE_SOUTH,
             EDGE_WEST, SIDE_NONE;
-        patch_word: SHIFT_COUNT, FINEST_DEPTH;
+        patch_word: SHIFT_COUNT, FINEST_DEPTH, DEPTH_CUT, PATCH_CUT;
         shared: NONE, SAMPLE_BITS, SKIRT_FIRST, HEIGHTS_WORD, SLOPES_WORD, VOIDS_WORD, STRIDE_ERRORS_WORD, CODES_WORD,
-            CONTROLS_WORD, SLOT_WORDS, SLOTS_PER_PAGE, FLAG_DRAW_VOIDS, FLAG_DEPTH_COLORS, FLAG_SRGB_OUT,
-            FLAG_WIREFRAME, TILE_VISIBLE, TILE_VOIDS, SIDE_INDEX_MASK, SIDE_SAME, SIDE_COARSER, SIDE_FINER,
-            UPLOAD_CONTROLS_WORD, UPLOAD_DETAIL_WORD, UPLOAD_VOIDS_WORD, UPLOAD_CODES_WORD, UPLOAD_WORDS,
+            CONTROLS_WORD, CUT_WORD, SLOT_WORDS, SLOTS_PER_PAGE, FLAG_DRAW_VOIDS, FLAG_DEPTH_COLORS, FLAG_SRGB_OUT,
+            FLAG_WIREFRAME, TILE_VISIBLE, TILE_VOIDS, TILE_CUT, FEATURE_BORDER, SIDE_INDEX_MASK, SIDE_SAME, SIDE_COARSER, SIDE_FINER,
+            UPLOAD_CONTROLS_WORD, UPLOAD_DETAIL_WORD, UPLOAD_VOIDS_WORD, UPLOAD_CODES_WORD, UPLOAD_CUT_WORD,
+            UPLOAD_WORDS,
             INDEX_COUNT_WORD, INSTANCE_COUNT_WORD, SHIFT_COUNTS_WORD, CURSOR_WORD, CLASS_COUNTS_WORD, DRAW_LIST_WORDS;
     };
     let wgsl = shader_constants();
@@ -142,6 +145,7 @@ fn the_words_of_a_slot_follow_each_other_within_a_page() {
         (shared::STRIDE_ERRORS_WORD, 2 * geo::PATCH_COUNT),
         (shared::CODES_WORD, geo::PATCH_COUNT / 4),
         (shared::CONTROLS_WORD, geo::CAGE_CONTROL_COUNT),
+        (shared::CUT_WORD, geo::PATCH_COUNT / 32),
     ];
     let end = parts.iter().fold(0, |at, &(word, count)| {
         assert_eq!(word, at);

@@ -19,5 +19,6 @@ const VOIDS_WORD: u32 = 33282u;     // 521 words of bits
 const STRIDE_ERRORS_WORD: u32 = 33803u; // 1024 × 2 f32, metres: stride 4, stride 2 against stride 1
 const CODES_WORD: u32 = 35851u;     // 256 words, four patch codes a word, lowest byte first
 const CONTROLS_WORD: u32 = 36107u;  // 1225 i32, units
+const CUT_WORD: u32 = 37332u;       // 32 words, a bit a patch that a feature stands in for, lowest first
 const SLOT_WORDS: u32 = 37376u;     // rounded up: 149,504 bytes
 const SLOTS_PER_PAGE: u32 = 897u;   // what fits 128 MiB

@@ -39,6 +39,11 @@ fn pool_stride_error(slot: u32, patch_index: u32, depth: u32) -> f32 {
     return bitcast<f32>(pool(slot, STRIDE_ERRORS_WORD + patch_index * 2u + depth));
 }
 
+// True when a feature stands in the place of a patch.
+fn pool_cut(slot: u32, patch_index: u32) -> bool {
+    return ((pool(slot, CUT_WORD + patch_index / 32u) >> (patch_index % 32u)) & 1u) != 0u;
+}
+
 // The nibble of depth 0 or 1.
 fn pool_code(slot: u32, patch_index: u32, depth: u32) -> u32 {
     return (pool(slot, CODES_WORD + patch_index / 4u) >> (patch_index % 4u * 8u + depth * 4u)) & 15u;

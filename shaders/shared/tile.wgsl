@@ -27,6 +27,7 @@ struct DrawnTile {
 
 const TILE_VISIBLE: u32 = 1u;       // in the view; others are listed for their borders alone
 const TILE_VOIDS: u32 = 2u;         // it has void bits
+const TILE_CUT: u32 = 4u;           // a feature is drawn in place of its cut patches
 
 // A side's neighbour: drawn tile | relation << 30; NONE where there is none.
 // Same level and coarser: both words are equal. Finer: two tiles, the west or north one first.

@@ -15,4 +15,5 @@ const UPLOAD_CONTROLS_WORD: u32 = 0u;   // 1225 i32, units
 const UPLOAD_DETAIL_WORD: u32 = 1225u;  // 16641 i32, codes
 const UPLOAD_VOIDS_WORD: u32 = 17866u;  // 521 words of bits, lowest first
 const UPLOAD_CODES_WORD: u32 = 18387u;  // 256 words, four patch codes a word, lowest byte first
-const UPLOAD_WORDS: u32 = 18643u;
+const UPLOAD_CUT_WORD: u32 = 18643u;    // 32 words of bits, lowest first
+const UPLOAD_WORDS: u32 = 18675u;

@@ -20,5 +20,6 @@ pub const SHARED: &[(&str, &str)] = &[
     ("colors", include_str!("../shared/colors.wgsl")),
     ("patch_word", include_str!("../shared/patch_word.wgsl")),
     ("draw_list", include_str!("../shared/draw_list.wgsl")),
+    ("feature", include_str!("../shared/feature.wgsl")),
     ("upload", include_str!("../shared/upload.wgsl")),
 ];

@@ -19,6 +19,8 @@
 @group(2) @binding(1) var<storage, read_write> raised: array<u32>;
 @group(2) @binding(2) var<storage, read_write> patches: array<u32>;
 
+const PACKED_CUT: u32 = 64u;         // in packed depths: the patch is cut out for a feature
+
 // Three depths of 2 bits, one a shift.
 fn shifted_depth(packed: u32, shift: u32) -> u32 {
     return (packed >> (2u * shift)) & 3u;
@@ -34,19 +36,28 @@ fn lessen(a: u32, b: u32) -> u32 {
     return a - min(a, b);
 }
 
+// A depth at a shift; that of a cut patch stays, for its border is the feature's.
+fn lessened(depth: u32, shift: u32) -> u32 {
+    if (depth & DEPTH_CUT) != 0u {
+        return FINEST_DEPTH;
+    }
+    return lessen(depth, shift);
+}
+
 // Raised depths of a patch among the tiles of its own level, for every shift.
 fn raised_depths(tile: u32, patch_index: u32) -> u32 {
     let own = depths[tile * PATCH_COUNT + patch_index];
-    var neighbour = 0u;
+    var neighbours = vec3u(0u); // the deepest, for every shift
     for (var edge = EDGE_NORTH; edge <= EDGE_WEST; edge <<= 1u) {
         let across = facing(tile, patch_index, edge);
         if across.relation == SIDE_SAME {
-            neighbour = max(neighbour, depths[across.tile * PATCH_COUNT + across.first]);
+            let depth = depths[across.tile * PATCH_COUNT + across.first];
+            neighbours = max(neighbours, vec3u(lessened(depth, 0u), lessened(depth, 1u), lessened(depth, 2u)));
         }
     }
-    var packed = 0u;
+    var packed = select(0u, PACKED_CUT, (own & DEPTH_CUT) != 0u);
     for (var shift = 0u; shift < SHIFT_COUNT; shift++) {
-        packed |= max(lessen(own, shift), lessen(neighbour, shift + 1u)) << (2u * shift);
+        packed |= max(lessened(own, shift), lessen(neighbours[shift], 1u)) << (2u * shift);
     }
     return packed;
 }
@@ -79,7 +90,7 @@ fn settled(tile: u32, patch_index: u32) -> u32 {
 }
 
 fn raise_to_finer(packed: u32, finer: u32) -> u32 {
-    var result = 0u;
+    var result = packed & PACKED_CUT;
     for (var shift = 0u; shift < SHIFT_COUNT; shift++) {
         let wanted = count_across(shifted_depth(finer, shift)) - 1u;
         result |= max(shifted_depth(packed, shift), wanted) << (2u * shift);
@@ -134,7 +145,7 @@ fn edges(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let own = settled(tile, patch_index);
-    var word = coarser_edges(tile, patch_index);
+    var word = coarser_edges(tile, patch_index) | select(0u, PATCH_CUT, (own & PACKED_CUT) != 0u);
     for (var shift = 0u; shift < SHIFT_COUNT; shift++) {
         word |= shifted_depth(own, shift) << (4u + 6u * shift);
     }

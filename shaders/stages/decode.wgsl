@@ -72,7 +72,7 @@ fn residual(upload: u32, row: u32, column: u32) -> i32 {
     return ((left + right) >> 1u) + headers[upload].quantum * code(upload, row, column);
 }
 
-// What goes into the slot as it came: voids, patch codes, controls.
+// What goes into the slot as it came: voids, patch codes, controls, cut bits.
 fn copy_rest(upload: u32, at: u32) {
     let start = upload * UPLOAD_WORDS;
     if at < CODES_WORD - STRIDE_ERRORS_WORD {
@@ -84,6 +84,9 @@ fn copy_rest(upload: u32, at: u32) {
         }
         if at < CAGE_CONTROL_COUNT {
             page[slot_word(upload, CONTROLS_WORD + at)] = staging[start + UPLOAD_CONTROLS_WORD + at];
+        }
+        if at < UPLOAD_WORDS - UPLOAD_CUT_WORD {
+            page[slot_word(upload, CUT_WORD + at)] = staging[start + UPLOAD_CUT_WORD + at];
         }
     }
 }

@@ -54,6 +54,9 @@ fn is_outside(tile: u32, patch_index: u32) -> bool {
 }
 
 fn patch_depth(tile: u32, patch_index: u32) -> u32 {
+    if (tiles[tile].flags & TILE_CUT) != 0u && pool_cut(tiles[tile].slot, patch_index) {
+        return FINEST_DEPTH | DEPTH_CUT;
+    }
     if is_outside(tile, patch_index) {
         return 0u;
     }

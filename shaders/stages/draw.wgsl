@@ -1,6 +1,8 @@
 // draw: the list of indices becomes pictures. A vertex index is a drawn tile and one of its samples.
 // Reads: frame, tiles, pool, imagery; patches and the head of the list where the engine's insides are shown.
-// Entry points: `vertex` (one thread a vertex), `color` and `depth_image` (one thread a pixel).
+// Entry points: `vertex` (one thread a vertex), `color` and `depth_image` (one thread a pixel); the same for features:
+// `feature_vertex`, `feature_color`, `feature_depth_image`. A feature's vertices are its own, but for those on the border
+// of its cut, which are samples of tiles and placed as `vertex` places them. Its normals are its vertices'.
 // A vertex is placed once, by the tile that owns it. Slopes are looked up per pixel in the samples, never taken from
 // the triangles, so that shading knows no depths.
 // Twin: core/reference/draw.rs
@@ -13,17 +15,20 @@
 #import patch_word
 #import draw_list
 #import colors
+#import feature
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(1) @binding(5) var color_layers: texture_2d_array<f32>;
 @group(1) @binding(6) var color_sampler: sampler;
 @group(2) @binding(0) var<storage, read> patches: array<u32>;
 @group(2) @binding(1) var<storage, read> draw_list: array<u32, DRAW_LIST_WORDS>;
+@group(2) @binding(2) var<storage, read> feature_vertices: array<FeatureVertex>;
+@group(2) @binding(3) var<storage, read> feature_place: FeaturePlace;
 
 const COLOR_TEXELS: f32 = 256.0;    // a side of a layer; the first and last lie on the tile's border
 
 struct Vertex {
-    @builtin(position) clip: vec4f,
+    @builtin(position) @invariant clip: vec4f,
     @location(0) position: vec3f,   // camera-relative metres
     @location(1) view_depth: f32,   // metres along the view axis
     @location(2) @interpolate(flat) tile: u32,
@@ -44,11 +49,44 @@ fn vertex_position(index: u32) -> vec3f {
     return tiles[tile].origin + vec3f(offset, rise);
 }
 
+fn clip_position(position: vec3f) -> vec4f {
+    return frame.clip_from_view_world * vec4f(position, 1.0);
+}
+
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> Vertex {
     let position = vertex_position(index);
-    let clip = frame.clip_from_view_world * vec4f(position, 1.0);
+    let clip = clip_position(position);
     return Vertex(clip, position, clip.w, index >> SAMPLE_BITS);
+}
+
+struct FeaturePoint {
+    @builtin(position) @invariant clip: vec4f,
+    @location(0) position: vec3f,   // camera-relative metres
+    @location(1) view_depth: f32,   // metres along the view axis
+    @location(2) @interpolate(flat) tile: u32,
+    @location(3) normal: vec3f,     // outward
+}
+
+@vertex
+fn feature_vertex(@builtin(vertex_index) index: u32) -> FeaturePoint {
+    var tile = 0u;
+    var position = vec3f(0.0);
+    var normal = vec3f(0.0);
+    if (index & FEATURE_BORDER) != 0u {
+        let at = index ^ FEATURE_BORDER;
+        tile = feature_place.tiles[at >> SAMPLE_BITS];
+        let sample = at & ((1u << SAMPLE_BITS) - 1u);
+        let place = vec2u(sample / TILE_SAMPLES, sample % TILE_SAMPLES);
+        position = vertex_position(owned_vertex(tile, place.x, place.y));
+        normal = normalize(vec3f(-ground_slope(tile, vec2f(place.yx)), 1.0));
+    } else {
+        tile = feature_place.tiles[feature_vertices[index].tile];
+        position = feature_place.origin + feature_vertices[index].position;
+        normal = feature_vertices[index].normal;
+    }
+    let clip = clip_position(position);
+    return FeaturePoint(clip, position, clip.w, tile, normal);
 }
 
 fn imagery(tile: u32, at: vec2f) -> vec3f {
@@ -105,6 +143,14 @@ fn ground_color(here: Place, height: f32) -> vec3f {
         let depth = word_depth(patch_word_at(here), drawn_shift());
         return lit(depth_color(depth, tiles[here.tile].level), normal, frame.sun);
     }
+    return surface_color(here, height, normal);
+}
+
+// The feature's colour in the light, before air.
+fn surface_color(here: Place, height: f32, normal: vec3f) -> vec3f {
+    if (frame.flags & FLAG_DEPTH_COLORS) != 0u {
+        return lit(depth_color(FINEST_DEPTH, tiles[here.tile].level), normal, frame.sun);
+    }
     if tiles[here.tile].color_slot != NONE {
         return softly_lit(imagery(here.tile, here.at), normal, frame.sun);
     }
@@ -116,6 +162,26 @@ fn ground_color(here: Place, height: f32) -> vec3f {
 // Tiles reach past the data set; nothing is drawn there.
 fn is_outside(at: vec2f) -> bool {
     return any(at < frame.ground_min) || any(at > frame.ground_max);
+}
+
+fn through_air(surface: vec3f, position: vec3f) -> vec4f {
+    var result = mix(frame.sky, surface, exp(-frame.haze * length(position)));
+    if (frame.flags & FLAG_SRGB_OUT) != 0u {
+        result = encode_srgb(result);
+    }
+    return vec4f(result, 1.0);
+}
+
+@fragment
+fn feature_color(in: FeaturePoint) -> @location(0) vec4f {
+    let here = locate(in.tile, in.position.xy);
+    let height = in.position.z + frame.camera_height;
+    return through_air(surface_color(here, height, normalize(in.normal)), in.position);
+}
+
+@fragment
+fn feature_depth_image(in: FeaturePoint) -> @location(0) f32 {
+    return in.view_depth;
 }
 
 @fragment
@@ -130,11 +196,7 @@ fn color(in: Vertex) -> @location(0) vec4f {
         let edge = wire(here, per_pixel_metres / abs(tiles[here.tile].step));
         result = mix(result, vec3f(0.01), 0.6 * edge);
     }
-    result = mix(frame.sky, result, exp(-frame.haze * length(in.position)));
-    if (frame.flags & FLAG_SRGB_OUT) != 0u {
-        result = encode_srgb(result);
-    }
-    return vec4f(result, 1.0);
+    return through_air(result, in.position);
 }
 
 // Metres along the view axis: clip.w of a perspective matrix whose w is the distance.

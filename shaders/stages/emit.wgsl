@@ -69,6 +69,9 @@ fn surface_triangles(word: u32, shift: u32) -> u32 {
 }
 
 fn patch_index_count(patch_index: u32, word: u32, shift: u32) -> u32 {
+    if (word & PATCH_CUT) != 0u {
+        return 0u;
+    }
     var triangles = surface_triangles(word, shift);
     let skirts = skirt_edges(patch_index);
     for (var edge = EDGE_NORTH; edge <= EDGE_WEST; edge <<= 1u) {
@@ -252,7 +255,7 @@ fn write(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_ind
         atomicMax(&draw_list[INSTANCE_COUNT_WORD], 1u);
     }
     workgroupBarrier();
-    if is_written {
+    if is_written && (word & PATCH_CUT) == 0u {
         at = group_start + patch_counts[local];
         write_patch(id.x, word, shift);
     }

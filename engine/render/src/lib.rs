@@ -38,11 +38,12 @@
 //! | `terrain` | the planner on one side, the renderer on the other |
 //! | `renderer` | a frame plan goes up, the stages run, one draw |
 //! | `stages` | one file a stage; twins in `shaders` and `drumlin_core::reference` |
-//! | `pool`, `color_pool`, `frame_buffers`, `staging` | what lies on the device; `vram` counts it |
+//! | `pool`, `color_pool`, `feature_pool`, `frame_buffers`, `staging` | what lies on the device; `vram` counts it |
 //! | `headless`, `offscreen` | a device and targets without a window |
 
 mod color_pool;
 mod error;
+mod feature_pool;
 mod frame_buffers;
 mod gpu_timer;
 pub mod headless;

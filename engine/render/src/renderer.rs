@@ -9,6 +9,7 @@ use drumlin_core::terrain::{FramePlan, PoolSizes, Upload};
 use crate::{
     DrawCounts, GpuTimes, RenderError, check_limits,
     color_pool::ColorPool,
+    feature_pool::FeaturePool,
     frame_buffers::FrameBuffers,
     gpu_timer::GpuTimer,
     pool::Pool,
@@ -43,6 +44,7 @@ pub struct Renderer {
     srgb_out: bool,
     pool: Pool,
     imagery: ColorPool,
+    features: FeaturePool,
     staging: Staging,
     view: FrameBuffers,
     stages: Stages,
@@ -109,6 +111,7 @@ impl Renderer {
             srgb_out: !descriptor.formats.color.is_srgb(),
             pool,
             imagery,
+            features: FeaturePool::new(stages.draw.feature_layout()),
             staging,
             view,
             stages,
@@ -142,6 +145,7 @@ impl Renderer {
         for upload in &plan.color_uploads {
             self.imagery.upload(queue, upload);
         }
+        self.features.write(device, queue, plan);
         if let Some(frame) = &plan.frame {
             self.view.write(queue, &plan.drawn, frame, self.srgb_out);
         }
@@ -168,6 +172,9 @@ impl Renderer {
             self.stages
                 .draw
                 .draw(pass, frame, draw, &self.view, distances);
+            self.stages
+                .draw
+                .draw_features(pass, &self.features, distances);
         }
     }
 
@@ -198,6 +205,7 @@ impl Renderer {
     pub fn byte_count(&self) -> u64 {
         self.pool.byte_count()
             + self.imagery.byte_count()
+            + self.features.byte_count()
             + self.staging.byte_count()
             + self.view.byte_count()
             + self.timer.as_ref().map_or(0, GpuTimer::byte_count)

@@ -6,7 +6,7 @@
 use drumlin_core::{
     reference::{
         decode::stage_tile,
-        shared::{UPLOAD_WORDS, UploadHeader},
+        shared::{UPLOAD_CUT_WORD, UPLOAD_WORDS, UploadHeader},
     },
     terrain::Upload,
 };
@@ -116,6 +116,9 @@ impl Staging {
             let start = self.words.len();
             self.words.resize(start + UPLOAD_WORDS, 0);
             stage_tile(&upload.tile, &mut self.words[start..]);
+            if let Some(cut) = &upload.cut {
+                self.words[start + UPLOAD_CUT_WORD..start + UPLOAD_WORDS].copy_from_slice(&cut[..]);
+            }
             count += 1;
         }
         if count > 0 {

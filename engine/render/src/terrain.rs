@@ -215,6 +215,8 @@ impl Terrain {
         self.renderer.prepare(device, queue, encoder, &self.plan);
         self.plan.uploads.clear();
         self.plan.color_uploads.clear();
+        self.plan.feature_uploads.clear();
+        self.plan.feature_frees.clear();
         self.is_prepared = true;
     }
 
@@ -337,6 +339,14 @@ fn take_over(before: &mut FramePlan, plan: &mut FramePlan) {
         .color_uploads
         .retain(|old| plan.color_uploads.iter().all(|new| new.layer != old.layer));
     plan.color_uploads.append(&mut before.color_uploads);
+    before.feature_uploads.retain(|old| {
+        plan.feature_uploads
+            .iter()
+            .all(|new| new.feature != old.feature)
+            && !plan.feature_frees.contains(&old.feature)
+    });
+    plan.feature_uploads.append(&mut before.feature_uploads);
+    plan.feature_frees.append(&mut before.feature_frees);
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "a power of two")]

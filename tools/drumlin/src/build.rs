@@ -2,20 +2,22 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
 use drumlin_core::{
+    cage::Placement,
     dem::{self, DemError, Image, Mosaic, OpenOptions, Raster},
     geo::CrsKind,
     pyramid::{
         PyramidError, VerticalReference,
         build::{BuildOptions, BuildReport, Imagery, build},
+        feature::FeatureInput,
     },
 };
 use drumlin_terminal::{outcome::Outcome, print, size};
 use serde_json::{Value, json};
 
-use crate::{interrupt, progress::Progress, sources};
+use crate::{cage, interrupt, progress::Progress, sources};
 
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
@@ -47,6 +49,9 @@ pub(crate) struct Arguments {
     /// A picture to lay over the terrain (PNG, JPEG, TIFF): of the same CRS, or of none and then stretched
     #[arg(long, value_name = "IMG")]
     imagery: Option<PathBuf>,
+    /// Cages to lay into the finest level: OBJ with tags and a line "# drumlin position X Y Z"
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    features: Vec<PathBuf>,
     /// Zero of the heights, where known
     #[arg(long, value_enum, default_value_t = Vertical::Unknown)]
     vertical: Vertical,
@@ -114,7 +119,27 @@ fn options(arguments: &Arguments) -> Result<BuildOptions> {
             Vertical::Orthometric => VerticalReference::Orthometric,
             Vertical::Unknown => VerticalReference::Unknown,
         },
+        features: arguments
+            .features
+            .iter()
+            .map(|file| feature(file))
+            .collect::<Result<_>>()?,
         sources: sources?,
+    })
+}
+
+/// Reads a cage and where it stands.
+fn feature(file: &Path) -> Result<FeatureInput> {
+    let text = cage::bytes(file)?;
+    let placement = Placement::read(&text).with_context(|| file.display().to_string())?;
+    Ok(FeatureInput {
+        name: file
+            .file_name()
+            .unwrap_or(file.as_os_str())
+            .to_string_lossy()
+            .into_owned(),
+        cage: cage::parse(file, &text)?,
+        placement,
     })
 }
 
@@ -196,6 +221,13 @@ fn lines(arguments: &Arguments, report: &BuildReport) -> String {
         size::display(report.height_bytes),
         size::display(report.source_bytes)
     );
+    if report.features > 0 {
+        text += &format!(
+            ", {} of {} features",
+            size::display(report.feature_bytes),
+            report.features
+        );
+    }
     if report.color_levels > 0 {
         text += &format!(", {} of imagery", size::display(report.color_bytes));
     }

@@ -5,6 +5,8 @@
 
 mod arguments;
 mod build;
+mod cage;
+mod feature;
 mod height;
 mod info;
 mod interrupt;
@@ -43,6 +45,12 @@ enum Verb {
     /// Heights of places, of the surface as stored at the finest level
     #[command(after_help = EXIT_CODES)]
     Height(height::Arguments),
+    /// Looks into a cage: counts, exact places of its surface, refinement
+    #[command(after_help = EXIT_CODES)]
+    Cage(cage::Arguments),
+    /// Makes the cage of a cliff, an arch or a road, for `build --features`
+    #[command(after_help = EXIT_CODES)]
+    Feature(feature::Arguments),
     /// Opens a window on a pyramid (`drumlin-view view`)
     #[command(disable_help_flag = true)]
     View(viewer::Arguments),
@@ -61,6 +69,8 @@ fn main() -> ExitCode {
         Verb::Info(arguments) => info::run(&arguments),
         Verb::Validate(arguments) => validate::run(&arguments),
         Verb::Height(arguments) => height::run(&arguments),
+        Verb::Cage(arguments) => cage::run(&arguments),
+        Verb::Feature(arguments) => feature::run(&arguments),
         Verb::View(arguments) => viewer::run("view", &arguments),
         Verb::Fly(arguments) => viewer::run("fly", &arguments),
     };

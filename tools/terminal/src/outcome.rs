@@ -2,7 +2,7 @@
 
 use std::{error::Error, process::ExitCode};
 
-use drumlin_core::{dem::DemError, pyramid::PyramidError};
+use drumlin_core::{cage::CageError, dem::DemError, pyramid::PyramidError};
 
 /// What every verb's help says of its exit code.
 pub const EXIT_CODES: &str = "Exit codes: 0 done, 1 invalid data, 2 wrong usage, 3 input or output failed, 4 interrupted (run again to go on)";
@@ -70,6 +70,13 @@ impl Outcome {
         if let Some(error) = cause.downcast_ref::<DemError>() {
             return Some(if matches!(error, DemError::Io { .. }) {
                 Self::Io
+            } else {
+                Self::InvalidData
+            });
+        }
+        if let Some(error) = cause.downcast_ref::<CageError>() {
+            return Some(if matches!(error, CageError::Shape(_)) {
+                Self::Usage
             } else {
                 Self::InvalidData
             });

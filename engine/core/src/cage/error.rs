@@ -131,6 +131,15 @@ pub enum CageError {
         /// The error.
         error: Box<CageError>,
     },
+    /// An OBJ text that does not say where it stands.
+    #[error(
+        "the cage does not say where it stands: add the line \"# drumlin position X Y Z\" before its first vertex \
+         (X and Y in the terrain's coordinates; Z in metres, or \"ground\")"
+    )]
+    NoPosition,
+    /// A landform that cannot be made: what of it, and why.
+    #[error("{0}")]
+    Shape(String),
     /// A place on the surface that is not there.
     #[error("no place ({u}, {v}) on face {face}: {reason}")]
     Place {

@@ -1,7 +1,7 @@
 //! Tags laid onto a linked topology.
 
 use super::error::CageError;
-use super::faces::{Crease, Tags};
+use super::faces::{Corner, Crease, Tags};
 use super::topology::{NONE, Topology};
 use crate::subdiv::stored_sharpness;
 
@@ -28,6 +28,36 @@ pub(super) fn set_sharpness(topology: &mut Topology, tags: &Tags) -> Result<(), 
     }
     sharpen_boundaries(topology);
     Ok(())
+}
+
+impl Topology {
+    /// The tags that are not there for a boundary's sake: those of inner edges, of vertices of more than one face, and
+    /// holes. A cage made part of a larger one is given these.
+    #[must_use]
+    pub fn tags(&self) -> Tags {
+        let written = |sharpness: f64| sharpness.min(crate::subdiv::INFINITE_SHARPNESS);
+        let creases = (0..self.edge_count())
+            .filter(|&edge| self.edge_sharpness(edge) > 0.0 && !self.is_boundary_edge(edge))
+            .map(|edge| Crease {
+                vertices: self.edge_vertices(edge),
+                sharpness: written(self.edge_sharpness(edge)),
+            });
+        let corners = (0..self.vertex_count())
+            .filter(|&vertex| {
+                self.vertex_sharpness(vertex) > 0.0 && self.vertex_corners(vertex).len() != 1
+            })
+            .map(|vertex| Corner {
+                vertex,
+                sharpness: written(self.vertex_sharpness(vertex)),
+            });
+        Tags {
+            creases: creases.collect(),
+            corners: corners.collect(),
+            holes: (0..self.face_count())
+                .filter(|&face| self.is_hole(face))
+                .collect(),
+        }
+    }
 }
 
 fn tagged_edge(topology: &Topology, crease: &Crease) -> Result<u32, CageError> {

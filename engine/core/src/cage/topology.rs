@@ -72,6 +72,23 @@ impl Cage {
         })
     }
 
+    /// The same cage with every vertex moved.
+    ///
+    /// # Errors
+    /// [`CageError`] for a position that is not finite.
+    pub fn moved(&self, to: impl Fn([f64; 3]) -> [f64; 3]) -> Result<Self, CageError> {
+        let positions: Vec<_> = self
+            .positions
+            .iter()
+            .map(|&position| to(position))
+            .collect();
+        super::build::check_positions(&positions)?;
+        Ok(Self {
+            positions,
+            topology: self.topology.clone(),
+        })
+    }
+
     /// Positions, one a vertex.
     #[must_use]
     pub fn positions(&self) -> &[[f64; 3]] {

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::feature::FeatureMetadata;
 use crate::geo::{Crs, Grid, WorldFrame};
 
 /// Heights' zero: never guessed.
@@ -77,6 +78,9 @@ pub struct Metadata {
     pub levels: Vec<Level>,
     /// Imagery, where there is any.
     pub color: Option<ColorMetadata>,
+    /// Authored features laid into the finest level, where there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub features: Option<FeatureMetadata>,
     /// What it was built from, in the order given.
     pub sources: Vec<SourceMetadata>,
 }

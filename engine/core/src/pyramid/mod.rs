@@ -4,6 +4,7 @@
 
 pub mod build;
 mod error;
+pub mod feature;
 mod files;
 mod metadata;
 mod patch_code;
@@ -11,7 +12,7 @@ mod query;
 mod reader;
 mod record;
 #[cfg(test)]
-mod sample;
+pub(crate) mod sample;
 mod shard;
 mod store;
 pub mod surface;
@@ -24,6 +25,7 @@ mod zarr;
 mod zarr_python;
 
 pub use error::PyramidError;
+pub use feature::{FeatureGroup, FeatureMetadata};
 pub use metadata::{ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};
 pub use patch_code::{HALF_OCTAVES, NEVER, patch_error, patch_nibble};
 pub use query::Heights;

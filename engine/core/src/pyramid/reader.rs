@@ -12,8 +12,8 @@ use std::{
 use lru::LruCache;
 
 use super::{
-    COLOR_TEXELS, MappedStore, Metadata, PyramidError, Record, RecordLayout, Store, StoreError,
-    Tile,
+    COLOR_TEXELS, FeatureGroup, MappedStore, Metadata, PyramidError, Record, RecordLayout, Store,
+    StoreError, Tile, feature,
     shard::{SHARD_TILES, ShardIndex, decode_chunk, shard_shape},
     surface::{self, CONTROL_LIMIT},
     zarr,
@@ -30,6 +30,7 @@ const RESIDUAL_LIMIT: u64 = 1 << 28;
 pub(super) enum Array {
     Tile,
     Color,
+    Feature,
 }
 
 impl Array {
@@ -38,6 +39,7 @@ impl Array {
         let shard = [tile.row / SHARD_TILES, tile.column / SHARD_TILES];
         match self {
             Self::Tile => zarr::shard_key(&format!("tile/{}", tile.level), shard, 1),
+            Self::Feature => zarr::shard_key(&format!("feature/{}", tile.level), shard, 1),
             Self::Color => zarr::shard_key(&format!("color/{}", tile.level), shard, 3),
         }
     }
@@ -184,6 +186,28 @@ impl Pyramid {
         }
         let bytes = COLOR_TEXELS * COLOR_TEXELS * 4;
         self.read_chunk(Array::Color, tile, bytes)
+    }
+
+    /// The features laid into a tile: those its record names, with the cages of those whose home it is. None where the
+    /// pyramid has no features, or none there.
+    ///
+    /// # Errors
+    ///
+    /// Where the record is missing, cut short or damaged, or holds a cage that is none.
+    pub fn read_features(&self, tile: TileId) -> Result<Vec<FeatureGroup>, PyramidError> {
+        let Some(features) = self.metadata.features else {
+            return Ok(Vec::new());
+        };
+        if tile.level != features.level || !self.has(tile) {
+            return Ok(Vec::new());
+        }
+        match self.read_chunk(Array::Feature, tile, features.record_bytes as usize)? {
+            None => Ok(Vec::new()),
+            Some(bytes) => feature::decode(&bytes, tile).map_err(|what| {
+                let name = self.store.name(&Array::Feature.shard_key(tile));
+                damaged(tile, format!("{name}: {what}"))
+            }),
+        }
     }
 
     /// Reads the record of a tile that the pyramid has, and checks all that can be checked without its parent.

@@ -214,9 +214,9 @@ fn check_summary(summary: &Summary, whose: &str) -> Result<(), String> {
     if !(error.is_finite() && error >= 0.0) {
         return Err(format!("{whose}'s error is {error} m"));
     }
-    if flags & !(Summary::PRESENT | Summary::VOID | Summary::ALL_VOID) != 0 {
+    if flags & !(Summary::PRESENT | Summary::VOID | Summary::ALL_VOID | Summary::FEATURE) != 0 {
         return Err(format!(
-            "{whose}'s flags are {flags:#x}, of which this version knows 0x7"
+            "{whose}'s flags are {flags:#x}, of which this version knows 0xf"
         ));
     }
     Ok(())
@@ -365,7 +365,7 @@ mod tests {
             (12, i32::MAX.to_le_bytes()),
             (20, f32::NAN.to_le_bytes()),
             (20, (-1_f32).to_le_bytes()),
-            (24, 8_u32.to_le_bytes()),
+            (24, 16_u32.to_le_bytes()),
             (0, 256_u32.to_le_bytes()),
         ] {
             let mut broken = bytes.clone();

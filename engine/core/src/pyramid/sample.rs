@@ -59,6 +59,7 @@ pub(super) fn metadata(rows: u32, columns: u32) -> Metadata {
         eps: 0.1,
         height_range: [-1700, 1700],
         levels: (0..=finest).map(level).collect(),
+        features: None,
         color: Some(ColorMetadata {
             levels: 1,
             texels: 256,

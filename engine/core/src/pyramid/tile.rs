@@ -25,6 +25,8 @@ impl Summary {
     pub const VOID: u32 = 2;
     /// Every sample is void.
     pub const ALL_VOID: u32 = 4;
+    /// A feature is laid into some of its patches.
+    pub const FEATURE: u32 = 8;
 
     /// True when the pyramid has this tile.
     #[must_use]

@@ -5,12 +5,14 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-use super::{COLOR_TEXELS, Metadata, RecordLayout, shard::shard_shape};
+use super::{COLOR_TEXELS, FeatureMetadata, Metadata, RecordLayout, shard::shard_shape};
 
 /// What a root's attributes say in `profile`.
 const PROFILE: &str = "drumlin";
 /// The root's file name, and every other node's.
 pub(super) const NODE: &str = "zarr.json";
+/// Bytes beyond which the features of a tile are not written or read.
+pub(super) const FEATURE_BYTES_LIMIT: u32 = 256 << 20;
 /// Bytes beyond which a root is not read.
 pub(super) const ROOT_LIMIT_BYTES: u64 = 16 << 20;
 
@@ -51,6 +53,12 @@ pub(super) fn tile_array_json(tiles: [u32; 2], layout: &RecordLayout) -> Vec<u8>
 pub(super) fn color_array_json(tiles: [u32; 2]) -> Vec<u8> {
     let names = ["row", "column", "texel_row", "texel_column", "rgba"];
     array_json(tiles, &[COLOR_TEXELS, COLOR_TEXELS, 4], &names)
+}
+
+/// The `zarr.json` of the features' records: `[rows, columns, bytes]`, one record a chunk.
+pub(super) fn feature_array_json(tiles: [u32; 2], features: &FeatureMetadata) -> Vec<u8> {
+    let bytes = features.record_bytes as usize;
+    array_json(tiles, &[bytes], &["row", "column", "byte"])
 }
 
 /// The file of a shard of `array`, as `tile/5`; `inner_dimensions` are those inside a chunk.
@@ -164,6 +172,21 @@ pub(super) fn check(metadata: &Metadata) -> Result<(), String> {
         ));
     }
     (0..grid.level_count()).try_for_each(|level| check_level(metadata, level))?;
+    if let Some(features) = &metadata.features {
+        if features.level != metadata.finest() {
+            return Err(format!(
+                "features at level {}; they are laid into the finest, {}",
+                features.level,
+                metadata.finest()
+            ));
+        }
+        if !(20..=FEATURE_BYTES_LIMIT).contains(&features.record_bytes) {
+            return Err(format!(
+                "feature records of {} bytes; 20 to {FEATURE_BYTES_LIMIT} are sane",
+                features.record_bytes
+            ));
+        }
+    }
     match &metadata.color {
         Some(color) if color.texels as usize != COLOR_TEXELS => Err(format!(
             "colour tiles of {} texels; this version has {COLOR_TEXELS}",

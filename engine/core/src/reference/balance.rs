@@ -16,8 +16,19 @@ use super::shared::{
         EDGES, PATCH_COUNT, SIDE_NONE, TILE_QUADS, facing, outer_edges, relation_of, sibling,
         side_words,
     },
-    patch_word::{FINEST_DEPTH, SHIFT_COUNT},
+    patch_word::{DEPTH_CUT, FINEST_DEPTH, PATCH_CUT, SHIFT_COUNT},
 };
+
+/// In packed depths: the patch is cut out for a feature.
+const PACKED_CUT: u32 = 1 << (2 * SHIFT_COUNT);
+
+/// A depth at a shift; that of a cut patch stays, for its border is the feature's.
+fn lessened(depth: u32, shift: u32) -> u32 {
+    if depth & DEPTH_CUT != 0 {
+        return FINEST_DEPTH;
+    }
+    depth.saturating_sub(shift)
+}
 
 /// Three depths of 2 bits, one a shift.
 const fn shifted_depth(packed: u32, shift: u32) -> u32 {
@@ -36,20 +47,21 @@ const fn place(tile: u32, patch: u32) -> usize {
 /// Raised depths of a patch among the tiles of its own level, for every shift.
 fn raised_depths(tiles: &[DrawnTile], depths: &[u32], tile: u32, patch: u32) -> u32 {
     let own = depths[place(tile, patch)];
-    let mut neighbour = 0;
+    let mut neighbours = [0; SHIFT_COUNT as usize];
     for edge in EDGES {
         let across = facing(tiles, tile, patch, edge);
         if across.relation == SIDE_SAME {
-            neighbour = neighbour.max(depths[place(across.tile, across.first)]);
+            let depth = depths[place(across.tile, across.first)];
+            for (shift, deepest) in (0..).zip(&mut neighbours) {
+                *deepest = lessened(depth, shift).max(*deepest);
+            }
         }
     }
-    (0..SHIFT_COUNT)
-        .map(|shift| {
-            own.saturating_sub(shift)
-                .max(neighbour.saturating_sub(shift + 1))
-                << (2 * shift)
-        })
-        .fold(0, |packed, depth| packed | depth)
+    let cut = if own & DEPTH_CUT == 0 { 0 } else { PACKED_CUT };
+    (0..)
+        .zip(neighbours)
+        .map(|(shift, deepest)| lessened(own, shift).max(deepest.saturating_sub(1)) << (2 * shift))
+        .fold(cut, |packed, depth| packed | depth)
 }
 
 /// Raised depths of all patches.
@@ -79,7 +91,7 @@ fn settled(tiles: &[DrawnTile], raised: &[u32], tile: u32, patch: u32) -> u32 {
 }
 
 fn raise_to_finer(packed: u32, finer: u32) -> u32 {
-    let mut result = 0;
+    let mut result = packed & PACKED_CUT;
     for shift in 0..SHIFT_COUNT {
         let wanted = count_across(shifted_depth(finer, shift)) - 1;
         result |= shifted_depth(packed, shift).max(wanted) << (2 * shift);
@@ -130,6 +142,9 @@ fn coarser_edges(drawn: &DrawnTile, patch: u32) -> u32 {
 fn patch_word(tiles: &[DrawnTile], raised: &[u32], tile: u32, patch: u32) -> u32 {
     let own = settled(tiles, raised, tile, patch);
     let mut word = coarser_edges(&tiles[tile as usize], patch);
+    if own & PACKED_CUT != 0 {
+        word |= PATCH_CUT;
+    }
     for shift in 0..SHIFT_COUNT {
         word |= shifted_depth(own, shift) << (4 + 6 * shift);
     }

@@ -7,9 +7,9 @@
 //! Based on: `FORMAT.md`, the rule of the regular tile; cubic B-splines.
 
 use super::shared::{
-    CODES_WORD, CONTROLS_WORD, HEIGHTS_WORD, SLOPES_WORD, SLOT_WORDS, STRIDE_ERRORS_WORD,
-    UPLOAD_CODES_WORD, UPLOAD_CONTROLS_WORD, UPLOAD_DETAIL_WORD, UPLOAD_VOIDS_WORD, UPLOAD_WORDS,
-    UploadHeader, VOIDS_WORD, pool::pack_2x16_float,
+    CODES_WORD, CONTROLS_WORD, CUT_WORD, HEIGHTS_WORD, SLOPES_WORD, SLOT_WORDS, STRIDE_ERRORS_WORD,
+    UPLOAD_CODES_WORD, UPLOAD_CONTROLS_WORD, UPLOAD_CUT_WORD, UPLOAD_DETAIL_WORD,
+    UPLOAD_VOIDS_WORD, UPLOAD_WORDS, UploadHeader, VOIDS_WORD, pool::pack_2x16_float,
 };
 use crate::{
     geo::{
@@ -50,7 +50,10 @@ pub fn stage_tile(tile: &Tile, words: &mut [u32]) {
     if let Some(voids) = &tile.voids {
         put_bytes(&mut words[UPLOAD_VOIDS_WORD..UPLOAD_CODES_WORD], voids);
     }
-    put_bytes(&mut words[UPLOAD_CODES_WORD..], &tile.patch_codes);
+    put_bytes(
+        &mut words[UPLOAD_CODES_WORD..UPLOAD_CUT_WORD],
+        &tile.patch_codes,
+    );
 }
 
 fn put_bytes(words: &mut [u32], bytes: &[u8]) {
@@ -131,9 +134,11 @@ pub(super) fn code_prediction(upload: &[u32], quantum: i32, row: usize, column: 
 fn copy_rest(slot: &mut [u32], upload: &[u32]) {
     slot[VOIDS_WORD..STRIDE_ERRORS_WORD]
         .copy_from_slice(&upload[UPLOAD_VOIDS_WORD..UPLOAD_CODES_WORD]);
-    slot[CODES_WORD..CONTROLS_WORD].copy_from_slice(&upload[UPLOAD_CODES_WORD..UPLOAD_WORDS]);
+    slot[CODES_WORD..CONTROLS_WORD].copy_from_slice(&upload[UPLOAD_CODES_WORD..UPLOAD_CUT_WORD]);
     slot[CONTROLS_WORD..CONTROLS_WORD + CAGE_CONTROL_COUNT]
         .copy_from_slice(&upload[UPLOAD_CONTROLS_WORD..UPLOAD_DETAIL_WORD]);
+    let cut = &upload[UPLOAD_CUT_WORD..UPLOAD_WORDS];
+    slot[CUT_WORD..CUT_WORD + cut.len()].copy_from_slice(cut);
 }
 
 /// Heights of every sample, and what is copied.

@@ -9,10 +9,10 @@
 use glam::{Vec2, Vec3};
 
 use super::shared::{
-    DrawnTile, Frame, NONE,
+    DrawnTile, Frame, NONE, TILE_CUT,
     border::{PATCH_COUNT, QUAD_SAMPLES, TILE_QUADS},
-    patch_word::FINEST_DEPTH,
-    pool::{Pages, pool_code, pool_stride_error},
+    patch_word::{DEPTH_CUT, FINEST_DEPTH},
+    pool::{Pages, pool_code, pool_cut, pool_stride_error},
 };
 
 /// 2^(n / 2): what nibble n of a patch code multiplies.
@@ -81,6 +81,9 @@ fn is_outside(frame: &Frame, tile: &DrawnTile, patch: u32) -> bool {
 }
 
 fn patch_depth(frame: &Frame, tile: &DrawnTile, pages: &Pages<'_>, patch: u32) -> u32 {
+    if tile.flags & TILE_CUT != 0 && pool_cut(pages, tile.slot, patch) {
+        return FINEST_DEPTH | DEPTH_CUT;
+    }
     if is_outside(frame, tile, patch) {
         return 0;
     }

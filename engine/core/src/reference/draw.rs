@@ -10,8 +10,9 @@
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
 use super::shared::{
-    DrawnTile, FLAG_DEPTH_COLORS, FLAG_SRGB_OUT, Frame, SAMPLE_BITS, SKIRT_FIRST,
-    border::{PATCH_COUNT, QUAD_SAMPLES, TILE_QUADS, TILE_SAMPLES, skirt_sample},
+    DrawnTile, FEATURE_BORDER, FLAG_DEPTH_COLORS, FLAG_SRGB_OUT, FeatureVertex, Frame, SAMPLE_BITS,
+    SKIRT_FIRST,
+    border::{PATCH_COUNT, QUAD_SAMPLES, TILE_QUADS, TILE_SAMPLES, owned_vertex, skirt_sample},
     colors::{depth_color, encode_srgb, lit, natural_color},
     ground::{Place, ground_slope, locate},
     patch_word::word_depth,
@@ -32,6 +33,37 @@ pub fn vertex_position(frame: &Frame, tiles: &[DrawnTile], pages: &Pages<'_>, in
     let offset = Vec2::new(place[1] as f32, place[0] as f32) * Vec2::from(tile.step);
     let rise = (height - tile.base) as f32 * frame.unit - lower;
     Vec3::from(tile.origin) + offset.extend(rise)
+}
+
+/// A feature's mesh where a frame draws it.
+#[derive(Clone, Copy, Debug)]
+pub struct PlacedFeature<'a> {
+    /// Camera-relative metres of its origin.
+    pub origin: [f32; 3],
+    /// Drawn tile of each of its tiles.
+    pub tiles: &'a [u32],
+    /// Its vertices.
+    pub vertices: &'a [FeatureVertex],
+}
+
+/// Camera-relative metres of a vertex of a feature: its own, or a sample of a tile, placed as [`vertex_position`] does.
+#[must_use]
+pub fn feature_position(
+    frame: &Frame,
+    tiles: &[DrawnTile],
+    pages: &Pages<'_>,
+    feature: &PlacedFeature<'_>,
+    index: u32,
+) -> Vec3 {
+    if index & FEATURE_BORDER == 0 {
+        let position = Vec3::from(feature.vertices[index as usize].position);
+        return Vec3::from(feature.origin) + position;
+    }
+    let at = index ^ FEATURE_BORDER;
+    let tile = feature.tiles[(at >> SAMPLE_BITS) as usize];
+    let sample = at & ((1 << SAMPLE_BITS) - 1);
+    let owned = owned_vertex(tiles, tile, sample / TILE_SAMPLES, sample % TILE_SAMPLES);
+    vertex_position(frame, tiles, pages, owned)
 }
 
 /// Clip coordinates of a camera-relative position; w is metres along the view axis.

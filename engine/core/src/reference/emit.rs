@@ -25,7 +25,7 @@ use super::shared::{
         EDGE_EAST, EDGE_NORTH, EDGE_SOUTH, EDGE_WEST, EDGES, PATCH_COUNT, QUAD_SAMPLES, TILE_CELLS,
         TILE_QUADS, TILE_SAMPLES, facing, outer_edges, owned_vertex, skirt_sample,
     },
-    patch_word::{FINEST_DEPTH, SHIFT_COUNT, word_coarser, word_depth, word_split},
+    patch_word::{FINEST_DEPTH, PATCH_CUT, SHIFT_COUNT, word_coarser, word_depth, word_split},
     pool::{Pages, pool_void},
 };
 
@@ -71,6 +71,9 @@ fn surface_triangles(word: u32, shift: u32) -> u32 {
 }
 
 fn patch_index_count(tiles: &[DrawnTile], tile: u32, patch: u32, word: u32, shift: u32) -> u32 {
+    if word & PATCH_CUT != 0 {
+        return 0;
+    }
     let mut triangles = surface_triangles(word, shift);
     let skirts = skirt_edges(tiles, tile, patch);
     for edge in EDGES {
@@ -275,6 +278,9 @@ pub fn write(
         writer.tile = tile;
         for patch in 0..PATCH_COUNT {
             let word = patches[(tile * PATCH_COUNT + patch) as usize];
+            if word & PATCH_CUT != 0 {
+                continue;
+            }
             let count = patch_index_count(tiles, tile, patch, word, shift);
             draw_list[CURSOR_WORD] += count;
             draw_list[INDEX_COUNT_WORD] += count;

@@ -30,6 +30,8 @@ pub const STRIDE_ERRORS_WORD: usize = 33_803;
 pub const CODES_WORD: usize = 35_851;
 /// First word of a slot's controls: 1,225 i32, units.
 pub const CONTROLS_WORD: usize = 36_107;
+/// First word of a slot's cut bits: 32 words, a bit a patch, lowest first.
+pub const CUT_WORD: usize = 37_332;
 /// Words of a slot.
 pub const SLOT_WORDS: usize = 37_376;
 /// Slots of a pool page of at most 128 MiB.
@@ -43,8 +45,10 @@ pub const UPLOAD_DETAIL_WORD: usize = 1_225;
 pub const UPLOAD_VOIDS_WORD: usize = 17_866;
 /// First word of an upload's patch codes: 256 words, four codes a word, lowest byte first.
 pub const UPLOAD_CODES_WORD: usize = 18_387;
-/// Words of an upload in the staging buffer: 74,572 bytes.
-pub const UPLOAD_WORDS: usize = 18_643;
+/// First word of an upload's cut bits: 32 words, a bit a patch, lowest first.
+pub const UPLOAD_CUT_WORD: usize = 18_643;
+/// Words of an upload in the staging buffer: 74,700 bytes.
+pub const UPLOAD_WORDS: usize = 18_675;
 
 /// First of the five words of the draw's arguments: the index count.
 pub const INDEX_COUNT_WORD: usize = 0;
@@ -72,6 +76,13 @@ pub const FLAG_WIREFRAME: u32 = 8;
 pub const TILE_VISIBLE: u32 = 1;
 /// The tile has void bits.
 pub const TILE_VOIDS: u32 = 2;
+
+/// A feature is drawn in place of the tile's cut patches.
+pub const TILE_CUT: u32 = 4;
+
+/// In the index list of a feature's mesh: the vertex is a sample of one of its tiles; the rest is the tile's place in the
+/// feature's list `<< 15 |` the sample.
+pub const FEATURE_BORDER: u32 = 1 << 31;
 
 /// The part of a side's word that is the neighbour's place in the drawn list.
 pub const SIDE_INDEX_MASK: u32 = 0x3fff_ffff;
@@ -188,4 +199,18 @@ pub struct UploadHeader {
     pub step: [f32; 2],
     /// 0.
     pub reserved_2: [f32; 2],
+}
+
+/// A vertex of a feature's mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct FeatureVertex {
+    /// Metres from the feature's origin.
+    pub position: [f32; 3],
+    /// The feature's tile under it: its place in the feature's list.
+    pub tile: u32,
+    /// Outward, unit length.
+    pub normal: [f32; 3],
+    /// 0.
+    pub reserved: u32,
 }

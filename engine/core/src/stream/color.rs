@@ -175,6 +175,15 @@ impl ColorPool {
         tree.node_mut(node).color = ColorLife::Absent;
     }
 
+    /// The colour pool is empty.
+    pub fn empty_layers(&mut self, tree: &mut Tree) {
+        for holder in self.holders.iter_mut().filter(|holder| **holder != NO_NODE) {
+            tree.node_mut(*holder).color = ColorLife::Absent;
+            *holder = NO_NODE;
+        }
+        self.free = (0..self.layers).rev().collect();
+    }
+
     /// A picture has been read.
     pub fn arrive(&mut self, tree: &mut Tree, node: u32, texels: Arc<[u8]>) {
         tree.node_mut(node).color = ColorLife::Ready(texels);

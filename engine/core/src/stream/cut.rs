@@ -117,7 +117,7 @@ impl Wanted {
         self.by_level.iter_mut().for_each(Vec::clear);
         self.split(tree, rule, limit) && {
             self.balance(tree, rule);
-            self.collect(tree);
+            self.collect(tree, rule);
             self.nodes.len() <= limit.nodes && self.leaf_count <= limit.leaves
         }
     }
@@ -178,18 +178,23 @@ impl Wanted {
         }
     }
 
-    /// Lists the tree, level by level.
-    fn collect(&mut self, tree: &Tree) {
+    /// Lists the tree, level by level. Tiles that are there for balance alone have not been judged yet; they are not
+    /// split, since they gain no more than their parents, which were not worth it.
+    fn collect(&mut self, tree: &mut Tree, rule: &CutRule) {
         self.nodes.clear();
         self.nodes.push(Tree::ROOT);
         self.leaf_count = 0;
-        let mut at = 0;
+        let (finest, mut at) = (tree.finest(), 0);
         while let Some(&place) = self.nodes.get(at) {
-            let node = tree.node(place);
+            let node = tree.node_mut(place);
+            if node.mark != self.run {
+                rule.judge(node, finest, self.run);
+                node.split = false;
+            }
             let before = self.nodes.len();
-            if node.mark == self.run && node.split {
-                self.nodes
-                    .extend(node.children.iter().filter(|&&child| child != NO_NODE));
+            if node.split {
+                let children = node.children.iter().filter(|&&child| child != NO_NODE);
+                self.nodes.extend(children);
             }
             self.leaf_count += usize::from(self.nodes.len() == before);
             at += 1;
@@ -204,14 +209,13 @@ fn parents_around(tree: &Tree, id: TileId) -> impl Iterator<Item = TileId> + use
         .checked_sub(1)
         .map_or([0, 0], |level| tree.grid().tiles(level));
     let near = |at: u32| {
-        [
-            Some(at / 2),
-            if at % 2 == 0 {
-                (at / 2).checked_sub(1)
-            } else {
-                Some(at / 2 + 1)
-            },
-        ]
+        let parent = at / 2;
+        let other = if at.is_multiple_of(2) {
+            parent.checked_sub(1)
+        } else {
+            Some(parent + 1)
+        };
+        [Some(parent), other]
     };
     let rows = near(id.row).map(|row| row.filter(|&row| row < rows));
     let columns = near(id.column).map(|column| column.filter(|&column| column < columns));

@@ -19,7 +19,7 @@ use crossbeam::channel::{Receiver, Sender, bounded};
 use super::TileSource;
 use crate::{
     geo::TileId,
-    pyramid::{PyramidError, Tile},
+    pyramid::{PyramidError, Summary, Tile, feature::FeatureGroup},
 };
 
 /// The right to have one request under way.
@@ -37,8 +37,8 @@ pub enum Job {
 /// What came of it.
 #[derive(Debug)]
 pub enum Loaded {
-    /// A tile.
-    Tile(Arc<Tile>),
+    /// A tile, and the features that stand in the place of some of its patches.
+    Tile(Arc<Tile>, Arc<[FeatureGroup]>),
     /// Imagery, or that there is none.
     Color(Option<Arc<[u8]>>),
     /// An error, of a tile or of imagery.
@@ -188,12 +188,25 @@ fn serve(
 
 fn read(source: &dyn TileSource, request: &Request) -> Loaded {
     let loaded = match &request.job {
-        Job::Tile(parent) => source
-            .load(request.id, parent.as_deref())
-            .map(|tile| Loaded::Tile(Arc::new(tile))),
+        Job::Tile(parent) => read_tile(source, request.id, parent.as_deref()),
         Job::Color => source.load_color(request.id).map(Loaded::Color),
     };
     loaded.unwrap_or_else(Loaded::Failed)
+}
+
+fn read_tile(
+    source: &dyn TileSource,
+    id: TileId,
+    parent: Option<&Tile>,
+) -> Result<Loaded, PyramidError> {
+    let tile = source.load(id, parent)?;
+    let is_finest = id.level == source.metadata().finest();
+    let features = if is_finest && tile.summary.flags & Summary::FEATURE != 0 {
+        source.load_features(id)?
+    } else {
+        Vec::new()
+    };
+    Ok(Loaded::Tile(Arc::new(tile), features.into()))
 }
 
 #[cfg(test)]

@@ -29,6 +29,9 @@ pub struct Neighbours {
     pub corner_sample: [u32; 4],
 }
 
+#[expect(clippy::cast_possible_truncation, reason = "it is 128")]
+const CELLS: u32 = TILE_CELLS as u32;
+
 /// The surroundings of a leaf.
 #[must_use]
 pub fn neighbours(tree: &Tree, leaf: &Leaf) -> Neighbours {
@@ -75,13 +78,12 @@ fn corner_owner(tree: &Tree, leaf: &Leaf, corner: usize) -> (u32, u32) {
     let Some(owner) = coarse.min_by_key(|near| (near.id.level, near.id.row, near.id.column)) else {
         return (tree.node(leaf.node).drawn, 0);
     };
-    let cells = TILE_CELLS as u32;
     let up = id.level - owner.id.level;
-    let sample =
-        |at: u32, step: usize, first: u32| ((at + step as u32) * cells >> up) - first * cells;
-    let row = sample(id.row, south, owner.id.row);
-    let column = sample(id.column, east, owner.id.column);
-    (owner.drawn, row * (cells + 1) + column)
+    // Samples from the owner's first to the corner; it touches the owner, so there are 0 to 128.
+    let sample = |corner: u32, first: u32| ((corner * CELLS) >> up) - first * CELLS;
+    let row = sample(id.row + u32::from(corner >= 2), owner.id.row);
+    let column = sample(id.column + u32::from(corner % 2 == 1), owner.id.column);
+    (owner.drawn, row * (CELLS + 1) + column)
 }
 
 #[cfg(test)]

@@ -88,14 +88,23 @@ impl Residency {
         true
     }
 
+    /// The pool is empty.
+    pub(crate) fn empty_slots(&mut self, tree: &mut Tree) {
+        for place in 0..tree.places() {
+            let node = tree.node_mut(place);
+            if let Life::Uploaded { tile, .. } = &node.life {
+                node.life = Life::Resident(tile.clone());
+            }
+        }
+        self.slots = SlotPool::new(self.slots.capacity());
+        self.forget_victims();
+    }
+
     fn evict(&mut self, tree: &mut Tree, colors: &mut ColorPool, victim: u32) {
-        let Some(bytes) = tree
-            .node(victim)
-            .tile()
-            .map(|tile| tile.byte_count() as u64)
-        else {
+        if tree.node(victim).tile().is_none() {
             return;
-        };
+        }
+        let bytes = tree.node(victim).byte_count();
         let slot = tree.node(victim).slot();
         for child in tree
             .node(victim)

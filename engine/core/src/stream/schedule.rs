@@ -147,15 +147,16 @@ impl Scheduler {
             return true;
         };
         match loaded {
-            Loaded::Tile(tile) if tile.id == flight.id => {
+            Loaded::Tile(tile, features) if tile.id == flight.id => {
                 if tree.node(place).tile().is_none() {
-                    room.ram_bytes += tile.byte_count() as u64;
                     tree.arrive(place, tile);
+                    tree.node_mut(place).features = features;
+                    room.ram_bytes += tree.node(place).byte_count();
                 }
             }
             Loaded::Color(texels) => self.color_came(tree, colors, place, ticket, texels),
             Loaded::Failed(error) => self.failed(tree, place, ticket, error.to_string(), now),
-            Loaded::Tile(tile) => self.failed(
+            Loaded::Tile(tile, _) => self.failed(
                 tree,
                 place,
                 ticket,
@@ -181,7 +182,7 @@ impl Scheduler {
         }
         match texels {
             Some(texels) if texels.len() as u64 == COLOR_BYTES => {
-                colors.arrive(tree, place, texels)
+                colors.arrive(tree, place, texels);
             }
             _ => tree.node_mut(place).color = ColorLife::Nothing,
         }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     geo::TileId,
-    pyramid::{Metadata, PyramidError, Tile},
+    pyramid::{Metadata, PyramidError, Tile, feature::FeatureGroup},
 };
 
 /// Something that hands out tiles: a pyramid on disk, one far away, or one that a test made up.
@@ -29,6 +29,21 @@ pub trait TileSource: Send + Sync {
     fn load_color(&self, id: TileId) -> Result<Option<Arc<[u8]>>, PyramidError> {
         let _ = id;
         Ok(None)
+    }
+
+    /// True when some finest tiles have features.
+    fn has_features(&self) -> bool {
+        false
+    }
+
+    /// Reads the features that stand in the place of patches of a finest tile.
+    ///
+    /// # Errors
+    ///
+    /// What went wrong with this tile; the next try may succeed.
+    fn load_features(&self, id: TileId) -> Result<Vec<FeatureGroup>, PyramidError> {
+        let _ = id;
+        Ok(Vec::new())
     }
 
     /// Bytes read so far, as stored; 0 where nobody counts.

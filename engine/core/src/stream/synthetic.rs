@@ -11,7 +11,10 @@ use std::{
 use super::{TileSource, Tree};
 use crate::{
     geo::{CAGE_CONTROL_COUNT, Crs, Grid, PATCH_COUNT, TILE_SAMPLE_COUNT, TileId},
-    pyramid::{ColorMetadata, Level, Metadata, PyramidError, Summary, Tile, VerticalReference},
+    pyramid::{
+        ColorMetadata, Level, Metadata, PyramidError, Summary, Tile, VerticalReference,
+        feature::FeatureGroup,
+    },
 };
 
 /// See the module.
@@ -28,6 +31,8 @@ pub(crate) struct Synthetic {
     pub(crate) void: Option<fn(TileId, usize, usize) -> bool>,
     /// Reads so far.
     pub(crate) reads: AtomicU64,
+    /// A feature: its group, with its cage.
+    pub(crate) feature: Option<FeatureGroup>,
 }
 
 impl Synthetic {
@@ -56,6 +61,7 @@ impl Synthetic {
             height_range: [0, 1600],
             levels: (0..grid.level_count()).map(level).collect(),
             color: None,
+            features: None,
             sources: Vec::new(),
         };
         Self {
@@ -66,6 +72,7 @@ impl Synthetic {
             rough: false,
             void: None,
             reads: AtomicU64::new(0),
+            feature: None,
         }
     }
 
@@ -113,11 +120,15 @@ impl Synthetic {
             0.1 * random * f32::from(up).exp2()
         };
         let slack = 100 * i32::from(up);
+        let has_feature = self
+            .feature
+            .as_ref()
+            .is_some_and(|group| group.tiles.contains(&id));
         Summary {
             min: 700 - slack,
             max: 900 + slack,
             error,
-            flags: Summary::PRESENT,
+            flags: Summary::PRESENT | if has_feature { Summary::FEATURE } else { 0 },
         }
     }
 
@@ -190,6 +201,21 @@ impl TileSource for Synthetic {
     fn load_color(&self, id: TileId) -> Result<Option<Arc<[u8]>>, PyramidError> {
         self.read(id)?;
         Ok(Some(vec![id.level; 256 * 256 * 4].into()))
+    }
+
+    fn has_features(&self) -> bool {
+        self.feature.is_some()
+    }
+
+    fn load_features(&self, id: TileId) -> Result<Vec<FeatureGroup>, PyramidError> {
+        let mut group = self.feature.clone();
+        if let Some(group) = group.as_mut().filter(|group| group.home != id) {
+            group.cage = None;
+        }
+        Ok(group
+            .filter(|group| group.tiles.contains(&id))
+            .into_iter()
+            .collect())
     }
 
     fn bytes_read(&self) -> u64 {

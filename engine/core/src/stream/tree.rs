@@ -20,7 +20,7 @@ use std::{
 use super::{Bounds, color::ColorLife};
 use crate::{
     geo::{Grid, TILE_CELLS, TileId},
-    pyramid::{Metadata, Summary, Tile},
+    pyramid::{Metadata, Summary, Tile, feature::FeatureGroup},
 };
 
 /// No node: outside the data set, or not known.
@@ -73,6 +73,8 @@ pub struct Node {
     pub life: Life,
     /// Where its imagery is.
     pub color: ColorLife,
+    /// Features that stand in the place of some of its patches; there while the tile is in memory.
+    pub features: Arc<[FeatureGroup]>,
     /// Last plan that looked at it.
     pub used: u64,
     /// Last plan that wanted it.
@@ -101,6 +103,19 @@ impl Node {
             Life::Resident(tile) | Life::Uploaded { tile, .. } => Some(tile),
             _ => None,
         }
+    }
+
+    /// Bytes in RAM of the tile and its features.
+    #[must_use]
+    pub fn byte_count(&self) -> u64 {
+        let tile = self.tile().map_or(0, |tile| tile.byte_count() as u64);
+        let cages = self.features.iter().filter_map(|group| group.cage.as_ref());
+        tile + cages
+            .map(|cage| {
+                let topology = cage.topology();
+                u64::from(topology.vertex_count()) * 48 + u64::from(topology.corner_count()) * 32
+            })
+            .sum::<u64>()
     }
 
     /// The slot, where the tile has one.
@@ -243,6 +258,7 @@ impl Tree {
         let node = self.node_mut(node);
         node.children = [NO_NODE; 4];
         node.life = Life::Absent;
+        node.features = Arc::default();
         true
     }
 
@@ -261,6 +277,7 @@ impl Tree {
             children: [NO_NODE; 4],
             life: Life::Absent,
             color: ColorLife::Absent,
+            features: Arc::default(),
             used: 0,
             wanted: 0,
             color_wanted: 0,

@@ -59,6 +59,8 @@ impl Default for PlannerDescriptor {
 }
 
 impl PlannerDescriptor {
+    /// One part in so many of both budgets is for features, where the data set has any.
+    pub const FEATURE_SHARE: u64 = 8;
     /// The least RAM budget, in tiles, beside what is set aside for reads under way.
     pub const MIN_RAM_TILES: u64 = 64;
 

@@ -6,7 +6,7 @@ use super::frame::point;
 use crate::{
     geo::TileId,
     pyramid::Tile,
-    reference::shared::{DrawnTile, Frame, TILE_VISIBLE},
+    reference::shared::{DrawnTile, FeatureVertex, Frame, TILE_VISIBLE},
     stream::{Bounds, View},
 };
 
@@ -19,6 +19,33 @@ pub struct Upload {
     pub tile: Arc<Tile>,
     /// Metres a column (east) and a row (north, negative) of the tile's samples.
     pub step: [f32; 2],
+    /// A bit for every patch that a feature stands in for, lowest first; none where there is no feature.
+    pub cut: Option<Box<[u32; 32]>>,
+}
+
+/// The mesh of a feature, to be put up in place of the one it had.
+#[derive(Clone, Debug)]
+pub struct FeatureUpload {
+    /// Which feature.
+    pub feature: u32,
+    /// Its vertices.
+    pub vertices: Arc<[FeatureVertex]>,
+    /// Three a triangle: vertices, or samples of its tiles on the border of its cut; see
+    /// [`FEATURE_BORDER`](crate::reference::shared::FEATURE_BORDER).
+    pub indices: Arc<[u32]>,
+}
+
+/// A feature to draw, in place of the cut patches of its tiles.
+#[derive(Clone, Debug)]
+pub struct FeatureDraw {
+    /// Which feature; its mesh is up.
+    pub feature: u32,
+    /// World metres of its origin.
+    pub place: [f64; 3],
+    /// Camera-relative metres of its origin.
+    pub origin: [f32; 3],
+    /// Drawn tiles that it lies in, in its own order.
+    pub tiles: Vec<u32>,
 }
 
 /// Imagery to be put into a layer of the colour pool.
@@ -56,6 +83,12 @@ pub struct FramePlan {
     pub places: Vec<Place>,
     /// South-west and north-east corner of the data set in world metres; tiles reach past it, what is drawn does not.
     pub ground: [[f64; 2]; 2],
+    /// Meshes of features that are new.
+    pub feature_uploads: Vec<FeatureUpload>,
+    /// Features whose meshes are no longer needed.
+    pub feature_frees: Vec<u32>,
+    /// The features to draw.
+    pub features: Vec<FeatureDraw>,
 }
 
 impl FramePlan {
@@ -76,6 +109,9 @@ impl FramePlan {
                 drawn.flags |= TILE_VISIBLE;
             }
         }
+        for feature in &mut self.features {
+            feature.origin = relative(feature.place, view.eye);
+        }
         if let Some(frame) = &mut self.frame {
             point(frame, view, self.ground);
         }
@@ -87,6 +123,9 @@ impl FramePlan {
         self.color_uploads.clear();
         self.drawn.clear();
         self.places.clear();
+        self.feature_uploads.clear();
+        self.feature_frees.clear();
+        self.features.clear();
         self.frame = None;
     }
 }

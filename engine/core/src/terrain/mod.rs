@@ -5,9 +5,14 @@
 //! height_at, normal_at, raycast → Surface: the same integers on the CPU
 //! ```
 
+mod descriptor;
+pub mod feature_mesh;
+mod feature_surface;
+mod features;
 mod frame;
 mod frame_plan;
 mod list;
+mod mesher;
 mod planner;
 mod pool;
 mod raycast;
@@ -16,8 +21,9 @@ mod stats;
 mod surface;
 mod update;
 
-pub use frame_plan::{ColorUpload, FramePlan, Place, Upload};
-pub use planner::{Planner, PlannerDescriptor};
+pub use descriptor::PlannerDescriptor;
+pub use frame_plan::{ColorUpload, FeatureDraw, FeatureUpload, FramePlan, Place, Upload};
+pub use planner::Planner;
 pub use pool::PoolSizes;
 pub use raycast::Hit;
 pub use source::PyramidSource;

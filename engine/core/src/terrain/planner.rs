@@ -17,68 +17,20 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{ColorUpload, FramePlan, FrameStats, PoolSizes, Upload, frame::FrameBase, list};
+use super::{
+    ColorUpload, FramePlan, FrameStats, PlannerDescriptor, PoolSizes, Upload,
+    features::{FeaturePool, cut_bits},
+    frame::FrameBase,
+    list,
+};
 use crate::{
     geo::TileId,
     pyramid::PyramidError,
     stream::{
         COLOR_BYTES, ColorLife, ColorPool, CutLimit, CutRule, Drawn, Life, Loader, Motion, NO_NODE,
-        PATIENCE, Relaxation, Requester, Residency, Retry, Scheduler, TILE_BYTES, TileSource, Tree,
-        View, Wanted,
+        PATIENCE, Relaxation, Requester, Residency, Scheduler, TileSource, Tree, View, Wanted,
     },
 };
-
-/// How a planner works.
-#[derive(Clone, Copy, Debug)]
-pub struct PlannerDescriptor {
-    /// Bytes of tiles and pictures in RAM, those in use and those under way included.
-    pub ram_budget_bytes: u64,
-    /// Bytes of GPU memory; see [`PoolSizes::within`].
-    pub vram_budget_bytes: u64,
-    /// Threads that read.
-    pub loader_threads: usize,
-    /// Requests under way at once.
-    pub in_flight: u32,
-    /// Largest screen-space error, pixels.
-    pub error_px: f64,
-    /// Largest texel of imagery on the screen, pixels.
-    pub texel_px: f64,
-    /// How much larger errors and texels may be outside the view, as a factor.
-    pub outside: f64,
-    /// Bytes a plan uploads at most.
-    pub upload_budget_bytes: u64,
-    /// A plan waits until nothing is missing, and then uploads all that is new whatever the upload budget; for pictures
-    /// and tests.
-    pub wait_for_tiles: bool,
-    /// Every patch takes this depth.
-    pub uniform_depth: Option<u32>,
-    /// How far ahead of the camera tiles are read while nothing else is, seconds; 0 for never.
-    pub prefetch_seconds: f64,
-    /// When to try again after a failure.
-    pub retry: Retry,
-}
-
-impl Default for PlannerDescriptor {
-    fn default() -> Self {
-        Self {
-            ram_budget_bytes: 512 << 20,
-            vram_budget_bytes: 512 << 20,
-            loader_threads: 2,
-            in_flight: 16,
-            error_px: 1.0,
-            texel_px: 2.0,
-            outside: 4.0,
-            upload_budget_bytes: 4 << 20,
-            wait_for_tiles: false,
-            uniform_depth: None,
-            prefetch_seconds: 1.0,
-            retry: Retry {
-                first_millis: 250,
-                longest_millis: 30_000,
-            },
-        }
-    }
-}
 
 /// See the module.
 #[derive(Debug)]
@@ -94,6 +46,7 @@ pub struct Planner {
     room: Residency,
     colors: ColorPool,
     scheduler: Scheduler,
+    features: Option<FeaturePool>,
     motion: Motion,
     relaxation: Relaxation,
     limit: CutLimit,
@@ -112,9 +65,6 @@ impl std::fmt::Debug for SharedSource {
 }
 
 impl Planner {
-    /// The least RAM budget, in tiles.
-    pub const MIN_RAM_TILES: u64 = 64;
-
     /// Reads the root, on this thread, and starts the loader threads.
     ///
     /// # Errors
@@ -125,9 +75,10 @@ impl Planner {
         descriptor: PlannerDescriptor,
     ) -> Result<Self, PyramidError> {
         let metadata = source.metadata();
+        let (descriptor, features) = set_features_aside(&*source, descriptor)?;
         let pool = PoolSizes::within(descriptor.vram_budget_bytes, metadata.color.is_some())?;
-        let color_limit = color_limit(&descriptor, &pool);
-        let limit = cut_limit(&descriptor, &pool, color_limit)?;
+        let color_limit = descriptor.color_limit(&pool);
+        let limit = descriptor.cut_limit(&pool, color_limit)?;
         let root = Arc::new(source.load(TileId::ROOT, None)?);
         let mut room = Residency::new(pool.slots, descriptor.ram_budget_bytes);
         room.ram_bytes = root.byte_count() as u64;
@@ -141,6 +92,7 @@ impl Planner {
             room,
             colors: ColorPool::new(metadata, pool.color_layers, descriptor.texel_px),
             scheduler: Scheduler::new(loader, descriptor.in_flight, descriptor.retry, color_limit),
+            features,
             motion: Motion::default(),
             relaxation: Relaxation::default(),
             limit,
@@ -166,7 +118,20 @@ impl Planner {
 
     /// What went wrong since the last call, each thing once, the first few.
     pub fn take_errors(&mut self) -> Vec<String> {
-        self.scheduler.take_errors()
+        let mut errors = self.scheduler.take_errors();
+        if let Some(features) = &mut self.features {
+            errors.append(&mut features.take_errors());
+        }
+        errors
+    }
+
+    /// The pool is empty: its device was lost. Tiles go there again from RAM, pictures are read again.
+    pub fn forget_uploads(&mut self) {
+        if let Some(features) = &mut self.features {
+            features.forget_uploads();
+        }
+        self.room.empty_slots(&mut self.tree);
+        self.colors.empty_layers(&mut self.tree);
     }
 
     /// The plan of a view.
@@ -194,6 +159,10 @@ impl Planner {
         self.drawn.find(&mut self.tree);
         list::fill(plan, &self.tree, &self.drawn, self.source.0.metadata());
         plan.ground = self.base.ground();
+        if let Some(features) = &mut self.features {
+            let how = (self.number, self.descriptor.wait_for_tiles);
+            features.plan(plan, &self.tree, &self.drawn, view, how);
+        }
         plan.frame = Some(self.base.frame(view, rule.tolerance, plan.drawn.len()));
         plan.aim(view);
         let mut stats = FrameStats {
@@ -373,7 +342,13 @@ impl Planner {
                 slot,
             };
             let step = list::step(&self.tree, id);
-            plan.uploads.push(Upload { slot, tile, step });
+            let cut = cut_bits(id, &self.tree.node(place).features);
+            plan.uploads.push(Upload {
+                slot,
+                tile,
+                step,
+                cut,
+            });
         }
         spent
     }
@@ -442,6 +417,11 @@ impl Planner {
             slots_used,
             color_layers_used: self.colors.used(),
             failures: self.scheduler.failures(),
+            features_drawn: plan.features.len(),
+            feature_bytes: self
+                .features
+                .as_ref()
+                .map_or([0; 2], FeaturePool::byte_counts),
             ..FrameStats::default()
         }
     }
@@ -465,55 +445,20 @@ impl Planner {
     }
 }
 
-/// Pictures that may be under way or wait for a layer: a quarter of RAM at most.
-fn color_limit(descriptor: &PlannerDescriptor, pool: &PoolSizes) -> usize {
-    let most = (descriptor.ram_budget_bytes / 4 / COLOR_BYTES).max(1);
-    let wanted = if descriptor.wait_for_tiles {
-        pool.color_layers
-    } else {
-        descriptor.in_flight
-    };
-    usize::try_from(most)
-        .unwrap_or(usize::MAX)
-        .min(wanted.min(pool.color_layers) as usize)
-}
-
-/// How many tiles a cut may take, so that RAM holds them beside all that may be under way, and the pool holds them.
-fn cut_limit(
-    descriptor: &PlannerDescriptor,
-    pool: &PoolSizes,
-    color_limit: usize,
-) -> Result<CutLimit, PyramidError> {
-    let aside = u64::from(descriptor.in_flight) * TILE_BYTES + color_limit as u64 * COLOR_BYTES;
-    let tiles = descriptor.ram_budget_bytes.saturating_sub(aside) / TILE_BYTES;
-    let refused = |what: String| Err(PyramidError::Refused(what));
-    if tiles < Planner::MIN_RAM_TILES {
-        let (budget, least) = (
-            descriptor.ram_budget_bytes,
-            aside + Planner::MIN_RAM_TILES * TILE_BYTES,
-        );
-        return refused(format!(
-            "a RAM budget of {budget} bytes is too small: at least {least} are needed"
-        ));
+/// A share of both budgets for features, where there are any.
+fn set_features_aside(
+    source: &dyn TileSource,
+    mut descriptor: PlannerDescriptor,
+) -> Result<(PlannerDescriptor, Option<FeaturePool>), PyramidError> {
+    if !source.has_features() {
+        return Ok((descriptor, None));
     }
-    if descriptor.upload_budget_bytes < TILE_BYTES + COLOR_BYTES {
-        let (budget, least) = (descriptor.upload_budget_bytes, TILE_BYTES + COLOR_BYTES);
-        return refused(format!(
-            "an upload budget of {budget} bytes is too small: at least {least} are needed"
-        ));
-    }
-    if descriptor.in_flight < 2 || !(descriptor.error_px > 0.0) || !(descriptor.texel_px > 0.0) {
-        return refused(
-            "at least two requests in flight and positive pixel targets are needed".into(),
-        );
-    }
-    let nodes = usize::try_from(tiles)
-        .unwrap_or(usize::MAX)
-        .min(pool.slots as usize);
-    Ok(CutLimit {
-        nodes,
-        leaves: pool.max_drawn as usize,
-    })
+    let ram = descriptor.ram_budget_bytes / PlannerDescriptor::FEATURE_SHARE;
+    let vram = descriptor.vram_budget_bytes / PlannerDescriptor::FEATURE_SHARE;
+    descriptor.ram_budget_bytes -= ram;
+    descriptor.vram_budget_bytes -= vram;
+    let pool = FeaturePool::new(ram, vram, source.metadata().unit())?;
+    Ok((descriptor, Some(pool)))
 }
 
 #[cfg(test)]

@@ -6,10 +6,12 @@
 //! A triangle is tested as the ray's height above its plane at both ends of the ray's way over it: ways of neighbouring
 //! triangles meet, so no ray slips through between them.
 
+use std::collections::BTreeMap;
+
 use super::surface::{BLOCK_CELLS, BLOCKS, Kept, Surface, TileFrame};
 use crate::{
     geo::{TILE_CELLS, TileId},
-    pyramid::{PyramidError, Summary},
+    pyramid::{PyramidError, Summary, feature::FeatureGroup},
     stream::Bounds,
 };
 
@@ -90,15 +92,31 @@ impl Surface {
             to: max,
         };
         let root = self.tile(TileId::ROOT)?.tile.summary;
-        match ray.within(&self.bounds(TileId::ROOT, &root)) {
-            Some(part) => self.descend(TileId::ROOT, &part),
-            None => Ok(None),
+        let Some(part) = ray.within(&self.bounds(TileId::ROOT, &root)) else {
+            return Ok(None);
+        };
+        let mut features = BTreeMap::new();
+        let mut nearest = self.descend(TileId::ROOT, &part, &mut features)?;
+        for group in features.values() {
+            let to = nearest.map_or(ray.to, |hit| hit.distance);
+            let hit = self
+                .feature(group)?
+                .raycast(ray.origin, ray.direction, [ray.from, to]);
+            nearest = hit.or(nearest);
         }
+        Ok(nearest)
     }
 
-    fn descend(&self, id: TileId, ray: &Ray) -> Result<Option<Hit>, PyramidError> {
+    /// The first hit of the ground, and the features of the tiles on the way there.
+    fn descend(
+        &self,
+        id: TileId,
+        ray: &Ray,
+        features: &mut BTreeMap<u32, FeatureGroup>,
+    ) -> Result<Option<Hit>, PyramidError> {
         let kept = self.tile(id)?;
         if id.level == self.finest() {
+            features.extend(kept.features.iter().map(|group| (group.id, group.clone())));
             return Ok(over_tile(&kept, &self.tile_frame(id), ray));
         }
         let children = id.children().into_iter().zip(kept.tile.children);
@@ -110,7 +128,7 @@ impl Surface {
         let mut met: Vec<_> = met.collect();
         met.sort_by(|a, b| a.1.from.total_cmp(&b.1.from));
         for (child, part) in met {
-            if let Some(hit) = self.descend(child, &part)? {
+            if let Some(hit) = self.descend(child, &part, features)? {
                 return Ok(Some(hit));
             }
         }

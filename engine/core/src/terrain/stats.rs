@@ -35,6 +35,10 @@ pub struct FrameStats {
     pub in_flight: usize,
     /// Reads that failed so far.
     pub failures: u64,
+    /// Features drawn in place of the ground they were laid into.
+    pub features_drawn: usize,
+    /// Bytes of features' meshes in GPU memory, and of them and what they are made from in RAM.
+    pub feature_bytes: [u64; 2],
     /// Time the plan took, milliseconds.
     pub update_millis: f64,
 }

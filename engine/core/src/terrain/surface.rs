@@ -1,7 +1,8 @@
 //! The surface on the CPU: heights, normals and meshes for physics, from the same integers that are drawn.
 //!
 //! The finest samples; each cell is cut from its north-west to its south-east sample. A triangle with a void corner is
-//! not there, and nothing is there outside the data set.
+//! not there, and nothing is there outside the data set. Where a feature stands its mesh is the surface, and of places
+//! above each other the highest is the height.
 //!
 //! Answers read tiles on the caller's thread: a place never asked for before costs a read a level (some hundred
 //! microseconds each from a local disk), one asked for before a look into a small cache (under a microsecond). Reading
@@ -14,14 +15,17 @@ use std::{
 
 use lru::LruCache;
 
+use super::{feature_mesh::CutPlace, feature_surface::FeatureSurface, features::cut_bits};
 use crate::{
-    geo::{Grid, TILE_CELLS, TILE_SAMPLES, TileId, WorldFrame},
-    pyramid::{PyramidError, Tile, surface},
+    geo::{Grid, QUAD_SAMPLES, TILE_CELLS, TILE_QUADS, TILE_SAMPLES, TileId, WorldFrame},
+    pyramid::{PyramidError, Summary, Tile, feature::FeatureGroup, surface},
     stream::TileSource,
 };
 
 /// Tiles kept: about 75 kB each, and as much again for those whose heights were asked for.
 const TILE_COUNT: NonZero<usize> = NonZero::new(128).unwrap();
+/// Features kept, meshed.
+const FEATURE_COUNT: NonZero<usize> = NonZero::new(16).unwrap();
 /// Cells a side of a block: the least part of a tile that has its own box.
 pub(super) const BLOCK_CELLS: usize = 8;
 /// Blocks a side of a tile.
@@ -34,6 +38,7 @@ pub struct Surface {
     source: Arc<dyn TileSource>,
     frame: WorldFrame,
     tiles: Mutex<LruCache<TileId, Arc<Kept>>>,
+    features: Mutex<LruCache<u32, Arc<FeatureSurface>>>,
 }
 
 /// A triangle mesh of a tile.
@@ -50,6 +55,9 @@ pub struct Collider {
 /// A tile that is kept, and its heights once they are asked for.
 pub(super) struct Kept {
     pub(super) tile: Tile,
+    /// Features that stand in the place of some of its patches, and a bit for every such patch.
+    pub(super) features: Vec<FeatureGroup>,
+    cut: Option<Box<[u32; 32]>>,
     heights: OnceLock<Heights>,
 }
 
@@ -76,6 +84,7 @@ impl Surface {
             source,
             frame,
             tiles: Mutex::new(LruCache::new(TILE_COUNT)),
+            features: Mutex::new(LruCache::new(FEATURE_COUNT)),
         }
     }
 
@@ -103,7 +112,8 @@ impl Surface {
         Ok(self.plane_at(place)?.map(|plane| plane.normal()))
     }
 
-    /// The mesh of a tile, of every `stride`th sample (a power of two up to 128), where the data set has data.
+    /// The mesh of a tile, of every `stride`th sample (a power of two up to 128), where the data set has data. At stride 1
+    /// features stand in it; otherwise it is the ground they were laid into.
     ///
     /// # Errors
     ///
@@ -121,7 +131,15 @@ impl Surface {
             });
         }
         let kept = self.tile(id)?;
-        Ok(collider(&kept, &self.tile_frame(id), stride))
+        let mut collider = collider(&kept, &self.tile_frame(id), stride);
+        for group in kept.features.iter().filter(|_| stride == 1) {
+            let place = group.tiles.iter().position(|&tile| tile == id);
+            let place = place.and_then(|place| u32::try_from(place).ok());
+            if let Some(place) = place {
+                self.feature(group)?.add_to(&mut collider, place);
+            }
+        }
+        Ok(collider)
     }
 
     pub(super) fn grid(&self) -> &Grid {
@@ -165,12 +183,57 @@ impl Surface {
         let tile = self
             .source
             .load(id, parent.as_ref().map(|parent| &parent.tile))?;
+        let has_features = id.level == self.finest() && tile.summary.flags & Summary::FEATURE != 0;
+        let features = if has_features {
+            self.source.load_features(id)?
+        } else {
+            Vec::new()
+        };
         let kept = Arc::new(Kept {
+            cut: cut_bits(id, &features),
+            features,
             tile,
             heights: OnceLock::new(),
         });
         tiles().put(id, Arc::clone(&kept));
         Ok(kept)
+    }
+
+    /// A feature's mesh.
+    pub(super) fn feature(
+        &self,
+        group: &FeatureGroup,
+    ) -> Result<Arc<FeatureSurface>, PyramidError> {
+        let features = || self.features.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(feature) = features().get(&group.id) {
+            return Ok(Arc::clone(feature));
+        }
+        let home = self.tile(group.home)?;
+        let cage = home
+            .features
+            .iter()
+            .find(|other| other.id == group.id)
+            .and_then(|other| other.cage.as_ref());
+        let cage = cage.ok_or_else(|| PyramidError::Tile {
+            tile: group.home,
+            what: format!("feature {} has no cage here", group.id),
+        })?;
+        let tiles = group.tiles.iter().map(|&id| self.tile(id));
+        let tiles = tiles.collect::<Result<Vec<_>, _>>()?;
+        let frame = self.tile_frame(TileId::new(self.finest(), 0, 0));
+        let at = |axis: usize, patch: u32| {
+            frame.corner[axis] + f64::from(patch) * QUAD_SAMPLES as f64 * frame.step[axis]
+        };
+        let place = CutPlace {
+            cut: group.cut,
+            corner: [at(0, group.cut[1]), at(1, group.cut[0])],
+            step: frame.step,
+            unit: frame.unit,
+        };
+        let feature = FeatureSurface::new(cage, place, tiles.iter().map(|kept| &kept.tile))?;
+        let feature = Arc::new(feature);
+        features().put(group.id, Arc::clone(&feature));
+        Ok(feature)
     }
 
     #[cfg(test)]
@@ -191,6 +254,15 @@ impl Surface {
         };
         let id = TileId::new(self.finest(), tile_row, tile_column);
         let kept = self.tile(id)?;
+        if kept.is_cut(row, column)
+            && let Some(group) = kept.feature_at([tile_row, tile_column], [row, column])
+        {
+            let hit = self.feature(group)?.height_at(place);
+            return Ok(hit.map(|(height, [east, north, up])| Plane {
+                height,
+                slope: [-east / up, -north / up],
+            }));
+        }
         Ok(kept.plane(row, column, [x, y], &self.tile_frame(id)))
     }
 }
@@ -234,11 +306,30 @@ impl Kept {
         })
     }
 
-    /// True when a triangle of a cell has no void corner.
+    /// True for a cell that a feature stands in the place of.
+    fn is_cut(&self, row: usize, column: usize) -> bool {
+        let [row, column] = [row, column].map(|cell| cell / QUAD_SAMPLES);
+        self.cut
+            .as_ref()
+            .is_some_and(|bits| bits[row] >> column & 1 != 0)
+    }
+
+    /// The feature whose cut a cell of the tile at a row and column lies in.
+    fn feature_at(&self, tile: [u32; 2], cell: [usize; 2]) -> Option<&FeatureGroup> {
+        let [row, column] =
+            [0, 1].map(|axis| tile[axis] as usize * TILE_QUADS + cell[axis] / QUAD_SAMPLES);
+        self.features.iter().find(|group| {
+            let [row0, column0, row1, column1] = group.cut.map(|patch| patch as usize);
+            (row0..row1).contains(&row) && (column0..column1).contains(&column)
+        })
+    }
+
+    /// True when a triangle of a cell is there: no feature is in its place, and it has no void corner.
     pub(super) fn has_triangle(&self, row: usize, column: usize, lower: bool) -> bool {
-        corners(row, column, lower)
-            .iter()
-            .all(|&[row, column]| !self.tile.is_void(row, column))
+        !self.is_cut(row, column)
+            && corners(row, column, lower)
+                .iter()
+                .all(|&[row, column]| !self.tile.is_void(row, column))
     }
 
     /// The plane at a part of a cell (x east, y south, 0 to 1). Corners without weight have no say, so that edges and
@@ -339,8 +430,8 @@ fn locate(at: f64, samples: u32) -> Option<(u32, usize, f64)> {
         reason = "at least 0 and under `samples`"
     )]
     let index = cell as u32;
-    let cells = TILE_CELLS as u32;
-    Some((index / cells, (index % cells) as usize, at - cell))
+    let (tile, cell_in_tile) = (index as usize / TILE_CELLS, index as usize % TILE_CELLS);
+    Some((u32::try_from(tile).ok()?, cell_in_tile, at - cell))
 }
 
 #[expect(
@@ -361,11 +452,17 @@ fn collider(kept: &Kept, frame: &TileFrame, stride: usize) -> Collider {
         ]
     };
     let mut indices = Vec::new();
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "at most 129 × 129 vertices"
+    )]
     let vertex = |[row, column]: [usize; 2]| (row * side + column) as u32;
     for (row, column) in
         (0..side - 1).flat_map(|row| (0..side - 1).map(move |column| (row, column)))
     {
-        if (row + 1) * stride > frame.cells[0] || (column + 1) * stride > frame.cells[1] {
+        let is_outside =
+            (row + 1) * stride > frame.cells[0] || (column + 1) * stride > frame.cells[1];
+        if is_outside || stride == 1 && kept.is_cut(row, column) {
             continue;
         }
         for triangle in [true, false].map(|lower| corners(row, column, lower)) {

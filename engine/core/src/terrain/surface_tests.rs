@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use crate::{
     geo::TileId,
+    pyramid::feature::FeatureGroup,
     stream::{TileSource, mix, synthetic::Synthetic},
-    terrain::Surface,
+    terrain::{Surface, feature_mesh::synthetic},
 };
 
 /// 300 × 260 metres, a sample a metre; a void in the second tile of the first row.
@@ -194,7 +195,7 @@ fn colliders_are_the_surface_where_there_is_one() {
     let hole = surface.collider(TileId::new(2, 0, 1), 1).unwrap();
     assert!(hole.indices.len() < whole.indices.len());
     let border = surface.collider(TileId::new(2, 2, 2), 4).unwrap();
-    assert_eq!(border.indices.len(), 1 * 11 * 6);
+    assert_eq!(border.indices.len(), 11 * 6);
     assert!(
         surface.collider(TileId::ROOT, 3).is_err()
             && surface.collider(TileId::new(9, 0, 0), 1).is_err()
@@ -214,4 +215,104 @@ fn the_cache_stays_small() {
         }
     }
     assert!(surface.kept() <= 128);
+}
+
+/// Rough ground with an arch of 200 units across the border of two tiles.
+fn with_arch() -> Surface {
+    let mut source = Synthetic::new(513, 513, 7);
+    let finest = source.metadata().finest();
+    let place = synthetic::arch_place(1.0, 1.0 / 16.0);
+    let tiles = vec![TileId::new(finest, 0, 0), TileId::new(finest, 0, 1)];
+    source.feature = Some(FeatureGroup {
+        id: 4,
+        home: tiles[0],
+        tiles,
+        cut: place.cut,
+        cage: Some(synthetic::arch_cage(200.0, |_, _| 800.0)),
+    });
+    source.rough = true;
+    Surface::new(Arc::new(source))
+}
+
+/// World x and y of a finest sample.
+fn sample(surface: &Surface, row: f64, column: f64) -> [f64; 2] {
+    let frame = surface.tile_frame(TileId::new(surface.finest(), 0, 0));
+    [
+        frame.corner[0] + column * frame.step[0],
+        frame.corner[1] + row * frame.step[1],
+    ]
+}
+
+#[test]
+fn inside_a_cut_the_feature_is_the_surface() {
+    let surface = with_arch();
+    // Under the crown: columns 104 + 24, rows 20 + 14.
+    let crown = sample(&surface, 34.0, 128.0);
+    let height = surface.height_at(crown).unwrap().unwrap();
+    assert!(height > 55.0, "{height}: 50 m of ground and the arch");
+    assert!(surface.normal_at(crown).unwrap().unwrap()[2] > 0.9);
+    let down = |from: f64| {
+        let hit = surface.raycast([crown[0], crown[1], from], [0.0, 0.0, -1.0], 200.0);
+        hit.unwrap().unwrap().position[2]
+    };
+    assert!((down(150.0) - height).abs() < 1e-4);
+    assert!(
+        (down(height - 6.0) - 50.0).abs() < 1.0,
+        "the ground under it"
+    );
+    // Through under the arch, and against its foot.
+    let along = |column: f64| {
+        let [x, y] = sample(&surface, 60.0, column);
+        surface
+            .raycast([x, y, 53.0], [0.0, 1.0, 0.0], 60.0)
+            .unwrap()
+    };
+    assert!(along(128.0).is_none());
+    let foot = along(104.0 + 14.0).unwrap();
+    assert!((20.0..30.0).contains(&foot.distance), "{}", foot.distance);
+    assert!(foot.normal[1] < -0.5, "it faces south");
+}
+
+#[test]
+fn heights_meet_on_a_cuts_border_and_nowhere_is_a_hole() {
+    let surface = with_arch();
+    for at in 0..400 {
+        let row = 16.0 + f64::from(at / 20) * 2.03;
+        let column = 98.0 + f64::from(at % 20) * 3.17;
+        assert!(
+            surface
+                .height_at(sample(&surface, row, column))
+                .unwrap()
+                .is_some()
+        );
+    }
+    let mut worst = 0.0_f64;
+    for column in 0..48 {
+        let column = 104.0 + f64::from(column) + 0.5;
+        let at = |row: f64| {
+            surface
+                .height_at(sample(&surface, row, column))
+                .unwrap()
+                .unwrap()
+        };
+        worst = worst.max((at(20.0 - 1e-5) - at(20.0 + 1e-5)).abs());
+    }
+    assert!(worst < 1e-3, "{worst}");
+}
+
+#[test]
+fn colliders_hold_the_feature_between_them() {
+    let surface = with_arch();
+    let finest = surface.finest();
+    let mut top = 0.0_f64;
+    for column in 0..2 {
+        let collider = surface.collider(TileId::new(finest, 0, column), 1).unwrap();
+        let ground = 2 * (128 * 128 - 8 * 6 * 16);
+        assert!(collider.indices.len() / 3 > ground + 2 * 8 * 6 * 16 / 2);
+        let highest = collider.positions.iter().map(|position| position[2]);
+        top = top.max(f64::from(highest.fold(0.0, f32::max)) + collider.origin[2]);
+        let coarse = surface.collider(TileId::new(finest, 0, column), 2).unwrap();
+        assert_eq!(coarse.indices.len() / 3, 2 * 64 * 64);
+    }
+    assert!(top > 55.0, "{top}");
 }

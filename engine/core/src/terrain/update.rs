@@ -25,6 +25,7 @@ pub struct Planned {
     pub stats: FrameStats,
     /// What went wrong since the plan before, each thing once.
     pub errors: Vec<String>,
+    epoch: u32,
 }
 
 /// Makes plans, on a thread of its own or on the caller's.
@@ -32,19 +33,29 @@ pub struct Planned {
 pub struct Updater {
     pool: PoolSizes,
     error_px: Option<f64>,
+    /// Devices lost so far.
+    epoch: u32,
     pace: Pace,
 }
 
 #[derive(Debug)]
 enum Pace {
-    Stepped(Box<Planner>, Option<FramePlan>),
+    Stepped(Box<Maker>, Option<Box<FramePlan>>),
     Paced(Option<Worker>),
+}
+
+/// The planner, wherever it works, and which device it counts on.
+#[derive(Debug)]
+struct Maker {
+    planner: Planner,
+    epoch: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Order {
     view: View,
     error_px: Option<f64>,
+    epoch: u32,
 }
 
 #[derive(Debug)]
@@ -63,7 +74,8 @@ impl Updater {
         Self {
             pool: planner.pool(),
             error_px: None,
-            pace: Pace::Stepped(Box::new(planner), None),
+            epoch: 0,
+            pace: Pace::Stepped(Box::new(Maker { planner, epoch: 0 }), None),
         }
     }
 
@@ -72,14 +84,15 @@ impl Updater {
     /// # Errors
     ///
     /// When the system gives no thread.
-    pub fn paced(mut planner: Planner) -> Result<Self, PyramidError> {
+    pub fn paced(planner: Planner) -> Result<Self, PyramidError> {
         let pool = planner.pool();
         let (orders, inbox) = bounded(1);
         let stale = inbox.clone();
         // Nothing is kept between the two: a plan waits until it is taken, and only then the next is begun.
         let (outbox, plans) = bounded(0);
         let (spare, spares) = bounded(2);
-        let work = move || work(&mut planner, &inbox, &spares, &outbox);
+        let maker = Maker { planner, epoch: 0 };
+        let work = move || work(maker, &inbox, &spares, &outbox);
         let thread = std::thread::Builder::new()
             .name("drumlin-update".into())
             .spawn(work);
@@ -96,6 +109,7 @@ impl Updater {
         Ok(Self {
             pool,
             error_px: None,
+            epoch: 0,
             pace: Pace::Paced(Some(worker)),
         })
     }
@@ -111,20 +125,30 @@ impl Updater {
         self.error_px = Some(error_px);
     }
 
+    /// The pool is empty, its device was lost: from the next view on all is uploaded again. Plans under way are dropped,
+    /// for they count on the pool as it was.
+    pub fn device_lost(&mut self) {
+        self.epoch = self.epoch.wrapping_add(1);
+    }
+
     /// Says what the camera sees now and takes a plan, aimed at it; none while the next one is being made.
     pub fn update(&mut self, view: &View) -> Option<Planned> {
         let order = Order {
             view: *view,
             error_px: self.error_px.take(),
+            epoch: self.epoch,
         };
         match &mut self.pace {
-            Pace::Stepped(planner, spare) => {
-                Some(carry_out(planner, order, spare.take().unwrap_or_default()))
+            Pace::Stepped(maker, spare) => {
+                Some(maker.make(order, *spare.take().unwrap_or_default()))
             }
             Pace::Paced(worker) => {
                 let worker = worker.as_ref()?;
                 worker.submit(order);
                 let mut planned = worker.plans.try_recv().ok()?;
+                if planned.epoch != self.epoch {
+                    return None;
+                }
                 planned.plan.aim(view);
                 Some(planned)
             }
@@ -134,9 +158,12 @@ impl Updater {
     /// Gives back the memory of a plan that is no longer drawn.
     pub fn recycle(&mut self, plan: FramePlan) {
         match &mut self.pace {
-            Pace::Stepped(_, spare) => *spare = Some(plan),
-            // When there is enough of it already, it goes.
-            Pace::Paced(worker) => drop(worker.as_ref().map(|worker| worker.spare.try_send(plan))),
+            Pace::Stepped(_, spare) => *spare = Some(Box::new(plan)),
+            Pace::Paced(Some(worker)) => {
+                // When there is enough of it already, it goes.
+                let _ = worker.spare.try_send(plan);
+            }
+            Pace::Paced(None) => {}
         }
     }
 }
@@ -174,28 +201,35 @@ impl Worker {
 }
 
 fn work(
-    planner: &mut Planner,
+    mut maker: Maker,
     orders: &Receiver<Order>,
     spares: &Receiver<FramePlan>,
     plans: &Sender<Planned>,
 ) {
     for order in orders {
-        let planned = carry_out(planner, order, spares.try_recv().unwrap_or_default());
+        let planned = maker.make(order, spares.try_recv().unwrap_or_default());
         if plans.send(planned).is_err() {
             return;
         }
     }
 }
 
-fn carry_out(planner: &mut Planner, order: Order, mut plan: FramePlan) -> Planned {
-    if let Some(error_px) = order.error_px {
-        planner.set_error_px(error_px);
-    }
-    let stats = planner.plan_into(&order.view, &mut plan);
-    Planned {
-        plan,
-        stats,
-        errors: planner.take_errors(),
+impl Maker {
+    fn make(&mut self, order: Order, mut plan: FramePlan) -> Planned {
+        if let Some(error_px) = order.error_px {
+            self.planner.set_error_px(error_px);
+        }
+        if std::mem::replace(&mut self.epoch, order.epoch) != order.epoch {
+            self.planner.forget_uploads();
+        }
+        let stats = self.planner.plan_into(&order.view, &mut plan);
+        let (errors, epoch) = (self.planner.take_errors(), self.epoch);
+        Planned {
+            plan,
+            stats,
+            errors,
+            epoch,
+        }
     }
 }
 
@@ -244,6 +278,25 @@ mod tests {
             }
         }
         panic!("{taken} plans, and tiles are missing");
+    }
+
+    #[test]
+    fn after_the_device_is_lost_no_plan_counts_on_it() {
+        let mut updater = Updater::paced(planner()).unwrap();
+        for step in 0..200 {
+            std::thread::sleep(Duration::from_micros(300));
+            updater.update(&view(step));
+        }
+        updater.device_lost();
+        let planned = (200..4000).find_map(|step| {
+            std::thread::sleep(Duration::from_micros(300));
+            updater.update(&view(step))
+        });
+        let plan = planned.unwrap().plan;
+        assert!(!plan.drawn.is_empty());
+        for drawn in &plan.drawn {
+            assert!(plan.uploads.iter().any(|upload| upload.slot == drawn.slot));
+        }
     }
 
     #[test]

@@ -1,7 +1,11 @@
-//! `draw`: frame, tiles, pages, imagery, patch words → colours or distances; one indirect draw of the emitted indices.
+//! `draw`: frame, tiles, pages, imagery, patch words → colours or distances; one indirect draw of the emitted indices,
+//! and one of each feature's mesh.
 
 use super::{Access, SharedLayouts, group, layout, module, storage};
-use crate::{color_pool::ColorPool, frame_buffers::FrameBuffers, offscreen::Offscreen, pool::Pool};
+use crate::{
+    color_pool::ColorPool, feature_pool::FeaturePool, frame_buffers::FrameBuffers,
+    offscreen::Offscreen, pool::Pool,
+};
 
 /// What a caller draws into.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +34,9 @@ pub(crate) struct Draw {
     own: wgpu::BindGroupLayout,
     color: wgpu::RenderPipeline,
     distance: wgpu::RenderPipeline,
+    feature: wgpu::BindGroupLayout,
+    feature_color: wgpu::RenderPipeline,
+    feature_distance: wgpu::RenderPipeline,
 }
 
 /// What the stage binds.
@@ -54,8 +61,25 @@ impl Draw {
             immediate_size: 0,
         });
         let module = module(device, "draw");
+        let seen = |binding| storage(binding, Access::Read, wgpu::ShaderStages::VERTEX);
+        let feature = layout(device, "drumlin feature", &[seen(2), seen(3)]);
+        let feature_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("drumlin feature"),
+            bind_group_layouts: &[Some(&shared.frame), Some(&tiles), Some(&feature)],
+            immediate_size: 0,
+        });
         let make = |entry, formats: &TargetFormats| {
-            pipeline(device, &module, &pipeline_layout, entry, formats)
+            pipeline(
+                device,
+                &module,
+                &pipeline_layout,
+                ["vertex", entry],
+                formats,
+            )
+        };
+        let make_feature = |entry, formats: &TargetFormats| {
+            let entries = ["feature_vertex", entry];
+            pipeline(device, &module, &feature_layout, entries, formats)
         };
         let distances = TargetFormats {
             color: Offscreen::DISTANCE_FORMAT,
@@ -65,6 +89,9 @@ impl Draw {
         Self {
             color: make("color", formats),
             distance: make("depth_image", &distances),
+            feature_color: make_feature("feature_color", formats),
+            feature_distance: make_feature("feature_depth_image", &distances),
+            feature,
             tiles,
             own,
         }
@@ -131,6 +158,32 @@ impl Draw {
         pass.set_index_buffer(view.indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.draw_indexed_indirect(&view.draw_list, 0);
     }
+
+    /// What a feature's mesh and place are bound as.
+    pub(crate) fn feature_layout(&self) -> wgpu::BindGroupLayout {
+        self.feature.clone()
+    }
+
+    /// Draws the features of a frame, after [`Draw::draw`], whose first two groups stay bound.
+    pub(crate) fn draw_features(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        features: &FeaturePool,
+        distances: bool,
+    ) {
+        for (at, feature) in features.drawn().enumerate() {
+            if at == 0 {
+                pass.set_pipeline(if distances {
+                    &self.feature_distance
+                } else {
+                    &self.feature_color
+                });
+            }
+            pass.set_bind_group(2, feature.bindings.as_ref(), &[]);
+            pass.set_index_buffer(feature.indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(0..feature.index_count, 0, 0..1);
+        }
+    }
 }
 
 fn tile_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
@@ -159,7 +212,7 @@ fn pipeline(
     device: &wgpu::Device,
     module: &wgpu::ShaderModule,
     layout: &wgpu::PipelineLayout,
-    fragment: &str,
+    [vertex, fragment]: [&str; 2],
     formats: &TargetFormats,
 ) -> wgpu::RenderPipeline {
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
@@ -167,7 +220,7 @@ fn pipeline(
         layout: Some(layout),
         vertex: wgpu::VertexState {
             module,
-            entry_point: Some("vertex"),
+            entry_point: Some(vertex),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             buffers: &[],
         },

@@ -9,6 +9,7 @@
 //! Holds all levels in memory, each as one array. Knows rasters and tiles; knows no screen.
 
 mod color;
+mod features;
 mod fit;
 mod levels;
 mod measure;
@@ -30,6 +31,7 @@ use std::time::Instant;
 
 pub use options::{BuildOptions, BuildReport, Imagery, Progress, Stage};
 
+use self::features::Features;
 use self::levels::Levels;
 use self::measure::Finest;
 use self::options::Watch;
@@ -141,7 +143,8 @@ impl Plan {
     ) -> Result<(Metadata, Vec<ShardInfo>, BuildReport), PyramidError> {
         let (grid, unit) = (&self.grid, self.scale.unit());
         let levels = Levels::new(raster, &self.scale, watch)?;
-        let measures = measure_all(&levels, grid, unit, watch)?;
+        let features = Features::new(&options.features, &levels, raster.header(), unit)?;
+        let measures = measure_all(&levels, grid, unit, &features, watch)?;
         let mut shards = write_all(&levels, &measures, grid, writer, watch)?;
         let finest = &levels.samples[levels.samples.len() - 1];
         let data = [grid.rows, grid.columns].map(|count| count as usize);
@@ -149,6 +152,10 @@ impl Plan {
         let root_error = f64::from(measures[0][0].summary.error);
         let mut report = self.report(options, &shards, root_error);
         report.void_samples = finest.void_count(data);
+        let feature_shards = features.write(grid, writer)?;
+        report.features = features.count();
+        report.feature_bytes = feature_shards.iter().map(|info| info.bytes).sum();
+        shards.extend(feature_shards);
         let levels = { levels }.levels;
         let color = imagery
             .map(|imagery| color::write(imagery, grid, writer, watch))
@@ -169,6 +176,7 @@ impl Plan {
             height_range,
             levels,
             color,
+            features: features.metadata(),
             sources: options.sources.clone(),
         };
         Ok((metadata, shards, report))
@@ -224,8 +232,12 @@ fn fingerprint(
     let imagery = imagery.map(|imagery| (&imagery.sources, imagery.image.extent));
     let version = env!("CARGO_PKG_VERSION");
     format!(
-        "{version} {:?} {:?} {:?} {:?} {imagery:?}",
-        header.grid, header.crs, scale, options.sources
+        "{version} {:?} {:?} {:?} {:?} {imagery:?} {}",
+        header.grid,
+        header.crs,
+        scale,
+        options.sources,
+        features::fingerprint(&options.features)
     )
     .replace('\n', " ")
 }

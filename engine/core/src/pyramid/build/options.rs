@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use serde::Serialize;
 
 use crate::dem::Image;
+use crate::pyramid::feature::FeatureInput;
 use crate::pyramid::{PyramidError, SourceMetadata, VerticalReference};
 
 /// What a build is asked for.
@@ -26,6 +27,8 @@ pub struct BuildOptions {
     pub memory_budget: Option<u64>,
     /// Zero of the heights, where the caller knows.
     pub vertical: VerticalReference,
+    /// Authored cages to lay into the finest level.
+    pub features: Vec<FeatureInput>,
     /// The input files, as the metadata name them. With them, an interrupted build is gone on with.
     pub sources: Vec<SourceMetadata>,
 }
@@ -106,6 +109,10 @@ pub struct BuildReport {
     pub level_bytes: Vec<u64>,
     /// Bytes of all height shards.
     pub height_bytes: u64,
+    /// Features laid into the ground.
+    pub features: u32,
+    /// Bytes of all feature shards.
+    pub feature_bytes: u64,
     /// Levels of imagery.
     pub color_levels: u8,
     /// Bytes of all imagery shards.

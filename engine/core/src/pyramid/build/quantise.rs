@@ -36,6 +36,12 @@ impl LevelCage {
         controls
     }
 
+    /// The control of a lattice point, −1 … 32 t + 1 each way.
+    pub(super) fn control(&self, row: i64, column: i64) -> i32 {
+        let [row, column] = [row, column].map(|at| usize::try_from(at + 1).unwrap_or(0));
+        self.controls[row * self.columns + column]
+    }
+
     /// What subdividing this cage once predicts at a row of the child level: Catmull-Clark on a lattice.
     fn predict_row(&self, row: usize, out: &mut [i32]) {
         let coarse = |tap: usize| &self.controls[(row / 2 + tap) * self.columns..][..self.columns];

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::features::Features;
 use super::levels::Levels;
 use super::measure::{Finest, TileErrors, measure};
 use super::options::{Stage, Watch};
@@ -28,6 +29,7 @@ pub(super) fn measure_all(
     levels: &Levels,
     grid: &Grid,
     unit: f64,
+    features: &Features,
     watch: &Watch<'_>,
 ) -> Result<Measures, PyramidError> {
     let tiles = levels
@@ -45,7 +47,7 @@ pub(super) fn measure_all(
             .map(|index| {
                 let tile = tile_at(grid, level, index);
                 let children = child_summaries(grid, tile, finer);
-                let measured = measure_tile(levels, grid, tile, &children, unit);
+                let measured = measure_tile(levels, grid, tile, &children, unit, features);
                 advance(1)?;
                 Ok(measured)
             })
@@ -90,6 +92,7 @@ fn measure_tile(
     tile: TileId,
     children: &[Summary; 4],
     unit: f64,
+    features: &Features,
 ) -> Measured {
     let place = [tile.row, tile.column];
     let samples = &levels.samples[usize::from(tile.level)];
@@ -105,7 +108,8 @@ fn measure_tile(
     let first = grid.first_sample(tile).map(|first| first as usize);
     let errors = measure(&heights, first, grid.stride(tile.level) as usize, &finest);
     let voids = samples.tile_voids(place).map_or(0, |(_, count)| count);
-    let summary = summarise(&heights, voids, ceil_f32(errors.whole * unit), children);
+    let mut summary = summarise(&heights, voids, ceil_f32(errors.whole * unit), children);
+    features.add_to(&mut summary, tile);
     let base = summary.error.max(ceil_f32(unit));
     let patch_codes = patch_codes(&errors, tile, grid, base, unit);
     Measured {
@@ -223,7 +227,7 @@ fn tile_count([rows, columns]: [u32; 2]) -> u64 {
 
 /// The least f32 that is no less.
 #[expect(clippy::cast_possible_truncation, reason = "corrected upwards")]
-fn ceil_f32(value: f64) -> f32 {
+pub(super) fn ceil_f32(value: f64) -> f32 {
     let nearest = value as f32;
     if f64::from(nearest) < value {
         nearest.next_up()

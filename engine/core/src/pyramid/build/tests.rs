@@ -28,7 +28,8 @@ impl Built {
         let cancel = AtomicBool::new(false);
         let watch = Watch::new(&|_| (), &cancel);
         let levels = Levels::new(raster, &plan.scale, &watch)?;
-        let measures = measure_all(&levels, &plan.grid, plan.scale.unit(), &watch)?;
+        let features = Features::new(&[], &levels, raster.header(), plan.scale.unit())?;
+        let measures = measure_all(&levels, &plan.grid, plan.scale.unit(), &features, &watch)?;
         let mut records = BTreeMap::new();
         for (level, about) in (0..).zip(&levels.levels) {
             let layout = RecordLayout::new(about);

@@ -17,6 +17,8 @@ pub(super) struct Deep<'a> {
     report: &'a mut Report,
     /// Borders of which one side has been seen: its hash, and whose it is.
     borders: HashMap<Border, (blake3::Hash, TileId)>,
+    /// Home and cut of every feature seen.
+    features: HashMap<u32, (TileId, [u32; 4])>,
     progress: &'a mut dyn FnMut(u64),
 }
 
@@ -39,6 +41,7 @@ impl<'a> Deep<'a> {
             pyramid,
             report,
             borders: HashMap::new(),
+            features: HashMap::new(),
             progress,
         }
     }
@@ -52,6 +55,7 @@ impl<'a> Deep<'a> {
         (self.progress)(self.report.tile_count);
         self.report.tile_count += 1;
         self.check_color(id);
+        let features = self.check_features(id);
         let tile = if parent.is_some() || self.pyramid.is_key(id) {
             self.pyramid
                 .read_tile(id, parent.map(|parent| &*parent.controls))
@@ -68,6 +72,9 @@ impl<'a> Deep<'a> {
         };
         let (summary, children) = tile.summaries();
         self.check_summaries(id, summary, children, said);
+        if (summary.flags & Summary::FEATURE != 0) != features {
+            self.find(id, "and the features' records say different things of it");
+        }
         if let Found::Whole(tile) = &tile {
             self.check_heights(tile);
         }
@@ -97,6 +104,44 @@ impl<'a> Deep<'a> {
             Ok(None) if id.level < levels => self.find(id, "has no imagery, at a level that has"),
             Ok(_) => {}
         }
+    }
+
+    /// Checks the features of a tile; true where there are any.
+    fn check_features(&mut self, id: TileId) -> bool {
+        let groups = match self.pyramid.read_features(id) {
+            Ok(groups) => groups,
+            Err(error) => {
+                self.find_error(id, &error);
+                return true;
+            }
+        };
+        let count = self
+            .pyramid
+            .metadata()
+            .features
+            .map_or(0, |features| features.groups);
+        for group in &groups {
+            if group.id >= count {
+                self.find(id, format!("has feature {} of {count}", group.id));
+            }
+            let homes = self
+                .features
+                .entry(group.id)
+                .or_insert((group.home, group.cut));
+            if *homes != (group.home, group.cut) {
+                self.find(
+                    id,
+                    format!("and others place feature {} differently", group.id),
+                );
+            }
+            if let Some(tile) = group.tiles.iter().find(|tile| !self.pyramid.has(**tile)) {
+                self.find(
+                    id,
+                    format!("has feature {}, which reaches to {tile}", group.id),
+                );
+            }
+        }
+        !groups.is_empty()
     }
 
     fn check_summaries(

@@ -147,6 +147,13 @@ fn check_nodes(path: &Path, metadata: &Metadata, report: &mut Report) {
             zarr::tile_array_json(level.tiles, &RecordLayout::new(level)),
         );
     }
+    if let Some(features) = &metadata.features {
+        check("feature".into(), zarr::group_json());
+        check(
+            format!("feature/{}", features.level),
+            zarr::feature_array_json(metadata.grid.tiles(features.level), features),
+        );
+    }
     let Some(color) = &metadata.color else { return };
     check("color".into(), zarr::group_json());
     for level in 0..color.levels {

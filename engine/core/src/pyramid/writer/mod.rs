@@ -17,6 +17,7 @@ use std::{
     collections::HashMap,
     fs::{self, File},
     io::{BufRead, BufReader, ErrorKind, Write},
+    ops::Range,
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
 };
@@ -173,6 +174,30 @@ impl PyramidWriter {
         self.write_block(key, &block, texels)
     }
 
+    /// Writes one block of the features' records, each of `record_bytes`; tiles without a feature have none.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::write_shard`].
+    pub fn write_feature_shard(
+        &self,
+        level: u8,
+        record_bytes: u32,
+        tiles: [u32; 2],
+        shard: [u32; 2],
+        records: &(dyn Fn(TileId) -> Option<Vec<u8>> + Sync),
+    ) -> Result<ShardInfo, PyramidError> {
+        let key = zarr::shard_key(&format!("feature/{level}"), shard, 1);
+        let block = Block {
+            level,
+            tiles,
+            shard,
+            chunk_bytes: record_bytes as usize,
+            sections: Vec::new(),
+        };
+        self.write_block(key, &block, records)
+    }
+
     /// Writes array metadata, manifest and root, and gives the pyramid its name.
     ///
     /// # Errors
@@ -254,6 +279,13 @@ impl PyramidWriter {
                 &zarr::tile_array_json(level.tiles, &RecordLayout::new(level)),
             )?;
         }
+        if let Some(features) = &metadata.features {
+            node("feature", &zarr::group_json())?;
+            node(
+                &format!("feature/{}", features.level),
+                &zarr::feature_array_json(metadata.grid.tiles(features.level), features),
+            )?;
+        }
         let Some(color) = &metadata.color else {
             return Ok(());
         };
@@ -328,8 +360,8 @@ fn check_complete(metadata: &Metadata, shards: &[ShardInfo]) -> Result<(), Strin
 
 /// The keys of all shards a pyramid has.
 pub(super) fn shard_keys(metadata: &Metadata) -> impl Iterator<Item = String> {
-    let arrays = |name: &'static str, levels: u8, inner| {
-        (0..levels).flat_map(move |level| {
+    let arrays = |name: &'static str, levels: Range<u8>, inner| {
+        levels.flat_map(move |level| {
             let [rows, columns] = shard_count(metadata.grid.tiles(level));
             (0..rows).flat_map(move |row| {
                 (0..columns).map(move |column| {
@@ -339,7 +371,12 @@ pub(super) fn shard_keys(metadata: &Metadata) -> impl Iterator<Item = String> {
         })
     };
     let color_levels = metadata.color.as_ref().map_or(0, |color| color.levels);
-    arrays("tile", metadata.grid.level_count(), 1).chain(arrays("color", color_levels, 3))
+    let features = metadata
+        .features
+        .map_or(0..0, |features| features.level..features.level + 1);
+    arrays("tile", 0..metadata.grid.level_count(), 1)
+        .chain(arrays("feature", features, 1))
+        .chain(arrays("color", 0..color_levels, 3))
 }
 
 /// Size and BLAKE3 of a file.

@@ -10,6 +10,7 @@ use crate::{
         shared::{
             DRAW_LIST_WORDS, SIDE_COARSER, SIDE_FINER, SLOT_WORDS,
             border::SIDE_NONE,
+            patch_word::DEPTH_CUT,
             synthetic::{Scene, frame, scene},
         },
     },
@@ -381,4 +382,43 @@ fn skirts_hang_below_every_border_but_those_of_equal_level() {
         }
     }
     assert_eq!(hanging * 2, skirts);
+}
+
+#[test]
+fn cut_patches_leave_a_hole_whose_border_has_every_sample_at_any_shift() {
+    let words = vec![0; 16 * SLOT_WORDS];
+    let pages: Pages<'_> = [&words, &[], &[], &[]];
+    let mut state = 3;
+    let scene = quarters(&[], &[]);
+    // Rows 5 to 11 and columns 28 to 35 of patches: across the border of two tiles.
+    let in_cut = |at: u32| {
+        let (tile, patch) = (at / PATCH_COUNT, at % PATCH_COUNT);
+        let row = tile / 2 * TILE_QUADS + patch / TILE_QUADS;
+        let column = tile % 2 * TILE_QUADS + patch % TILE_QUADS;
+        (5..12).contains(&row) && (28..36).contains(&column)
+    };
+    for kind in 0..3 {
+        let mut depths = random_depths(scene.tiles.len(), kind, &mut state);
+        for (at, depth) in (0..).zip(&mut depths) {
+            if in_cut(at) {
+                *depth = FINEST_DEPTH | DEPTH_CUT;
+            }
+        }
+        for shift in 0..SHIFT_COUNT {
+            let emitted = emit(&scene, &pages, &depths, shift);
+            let edges: HashSet<[u32; 2]> = surface(&emitted)
+                .flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]])
+                .collect();
+            let open = edges.iter().filter(|[a, b]| !edges.contains(&[*b, *a]));
+            let ends = open.map(|edge| edge.map(|end| place(&scene, end)));
+            let around: Vec<_> = ends
+                .filter(|[a, b]| !is_on_border(&scene, *a, *b))
+                .collect();
+            assert_eq!(around.len(), 2 * 4 * (7 + 8), "kind {kind}, shift {shift}");
+            for [a, b] in around {
+                // A sample of level 1 is two of the finest.
+                assert_eq!((a[0] - b[0]).abs() + (a[1] - b[1]).abs(), 2);
+            }
+        }
+    }
 }

@@ -3,8 +3,8 @@
 //! Twin: `shaders/shared/pool.wgsl`.
 
 use super::{
-    CODES_WORD, HEIGHTS_WORD, SLOPES_WORD, SLOT_WORDS, SLOTS_PER_PAGE, STRIDE_ERRORS_WORD,
-    VOIDS_WORD,
+    CODES_WORD, CUT_WORD, HEIGHTS_WORD, SLOPES_WORD, SLOT_WORDS, SLOTS_PER_PAGE,
+    STRIDE_ERRORS_WORD, VOIDS_WORD,
 };
 
 /// The pages, in binding order; unused ones are empty.
@@ -49,6 +49,12 @@ pub fn pool_stride_error(pages: &Pages<'_>, slot: u32, patch: u32, depth: u32) -
 #[must_use]
 pub fn pool_code(pages: &Pages<'_>, slot: u32, patch: u32, depth: u32) -> u32 {
     pool(pages, slot, CODES_WORD + patch as usize / 4) >> (patch % 4 * 8 + depth * 4) & 15
+}
+
+/// True when a feature stands in the place of a patch.
+#[must_use]
+pub fn pool_cut(pages: &Pages<'_>, slot: u32, patch: u32) -> bool {
+    pool(pages, slot, CUT_WORD + patch as usize / 32) >> (patch % 32) & 1 != 0
 }
 
 /// WGSL's `pack2x16float`, rounded to nearest even.
