@@ -98,11 +98,11 @@ fn copy_tree(from: &Path, to: &Path) {
         let path = entry.expect("the entry can be read").path();
         let target = to.join(path.file_name().expect("an entry has a name"));
         if path.is_dir() {
-            copy_tree(&path, &target)
+            copy_tree(&path, &target);
         } else {
             fs::copy(&path, &target)
                 .map(|_| ())
-                .expect("a file can be copied")
+                .expect("a file can be copied");
         }
     }
 }
@@ -111,9 +111,9 @@ fn files(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
     for entry in fs::read_dir(folder).expect("the folder can be read") {
         let path = entry.expect("the entry can be read").path();
         if path.is_dir() {
-            files(&path, found)
+            files(&path, found);
         } else {
-            found.push(path)
+            found.push(path);
         }
     }
 }

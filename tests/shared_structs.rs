@@ -16,8 +16,11 @@ fn modules() -> Vec<Module> {
         .collect()
 }
 
-/// Name, offset and size of the members of a struct; the size of the whole.
-fn members(module: &Module, name: &str) -> Option<(Vec<(String, u32, u32)>, u32)> {
+/// A struct's member: name, offset and size.
+type Member = (String, u32, u32);
+
+/// The members of a struct; the size of the whole.
+fn members(module: &Module, name: &str) -> Option<(Vec<Member>, u32)> {
     let (_, kind) = module
         .types
         .iter()

@@ -88,7 +88,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
     let options = options(arguments)?;
     let progress = Progress::new();
     let tell = |step: drumlin_core::pyramid::build::Progress| {
-        progress.tell(step.stage.label(), step.done, step.total)
+        progress.tell(step.stage.label(), step.done, step.total);
     };
     let report = build(&*raster, imagery.as_ref(), &options, &tell, &cancel)?;
     drop(progress);

@@ -180,7 +180,7 @@ mod tests {
         assert!(
             ["", "x", "0", "3 miles", "-2"]
                 .iter()
-                .all(|text| parse_bytes(text).is_err())
+                .all(|text| size::parse(text).is_err())
         );
         assert!(parse_error_px("nan").is_err() && parse_fps("0").is_err());
     }

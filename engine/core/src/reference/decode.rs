@@ -91,6 +91,7 @@ pub(super) fn base_height(upload: &[u32], row: usize, column: usize) -> i32 {
     let row_weights = LIMIT_WEIGHTS[row % QUAD_SAMPLES];
     let column_weights = LIMIT_WEIGHTS[column % QUAD_SAMPLES];
     let (mut high, mut low) = (0, 0);
+    #[expect(clippy::needless_range_loop, reason = "index loops, as in the kernel")]
     for i in 0..4 {
         for j in 0..4 {
             let weight = row_weights[i] * column_weights[j];
@@ -110,14 +111,14 @@ pub(super) fn base_height(upload: &[u32], row: usize, column: usize) -> i32 {
 /// The residual of an even column: rows between two others continue them.
 fn even_column_residual(upload: &[u32], quantum: i32, row: usize, column: usize) -> i32 {
     let own = quantum * code(upload, row, column);
-    if row % 2 == 0 {
+    if row.is_multiple_of(2) {
         return own;
     }
-    (quantum * (code(upload, row - 1, column) + code(upload, row + 1, column)) >> 1) + own
+    ((quantum * (code(upload, row - 1, column) + code(upload, row + 1, column))) >> 1) + own
 }
 
 fn residual(upload: &[u32], quantum: i32, row: usize, column: usize) -> i32 {
-    if column % 2 == 0 {
+    if column.is_multiple_of(2) {
         return even_column_residual(upload, quantum, row, column);
     }
     let left = even_column_residual(upload, quantum, row, column - 1);

@@ -6,6 +6,8 @@
 //! Based on: the feature processing unit of Lin, Wang, Sun, *Improved feature-adaptive subdivision for Catmull-Clark
 //! surface model*, 2018, with an error in pixels in place of its area ratio.
 
+use std::f32::consts::SQRT_2;
+
 use glam::{Vec2, Vec3};
 
 use super::shared::{
@@ -18,19 +20,19 @@ use super::shared::{
 /// 2^(n / 2): what nibble n of a patch code multiplies.
 const CODE_FACTORS: [f32; 15] = [
     1.0,
-    1.414_213_56,
+    SQRT_2,
     2.0,
-    2.828_427_12,
+    2.0 * SQRT_2,
     4.0,
-    5.656_854_25,
+    4.0 * SQRT_2,
     8.0,
-    11.313_708_5,
+    8.0 * SQRT_2,
     16.0,
-    22.627_417,
+    16.0 * SQRT_2,
     32.0,
-    45.254_834,
+    32.0 * SQRT_2,
     64.0,
-    90.509_668,
+    64.0 * SQRT_2,
     128.0,
 ];
 const CODE_NEVER: u32 = 15;

@@ -126,7 +126,7 @@ pub fn facing(tiles: &[DrawnTile], tile: u32, patch: u32, edge: u32) -> Facing {
             };
         }
         SIDE_COARSER => {
-            along = half_of(tiles[tile as usize].quadrant, edge) * (TILE_QUADS / 2) + along / 2
+            along = half_of(tiles[tile as usize].quadrant, edge) * (TILE_QUADS / 2) + along / 2;
         }
         SIDE_FINER => along = along % (TILE_QUADS / 2) * 2,
         _ => {}

@@ -244,7 +244,7 @@ fn corner_owner(id: TileId, corner: u32, places: &HashMap<TileId, u32>) -> (u32,
         .min()
         .unwrap_or(id);
     let up = id.level - owner.level;
-    let sample = |at: u32, first: u32| (at * 128 >> up) - first * 128;
+    let sample = |at: u32, first: u32| ((at * 128) >> up) - first * 128;
     let (row, column) = (
         sample(id.row + south, owner.row),
         sample(id.column + east, owner.column),
