@@ -25,6 +25,10 @@ pub(crate) fn fly() -> Result<()> {
             "-o",
             PYRAMID,
             "--overwrite",
+            "--features",
+            "assets/rainier_arch.obj",
+            "assets/rainier_cliff.obj",
+            "assets/rainier_road.obj",
         ],
     )?;
     if !has_display() {
