@@ -3,10 +3,10 @@
 
 const MEADOW = vec3f(0.150, 0.175, 0.075);
 const FOREST = vec3f(0.045, 0.075, 0.035);
-const HEATH = vec3f(0.175, 0.150, 0.090);
+const HEATH = vec3f(0.160, 0.148, 0.100);
 const ROCK = vec3f(0.205, 0.190, 0.175);
-const SNOW = vec3f(0.820, 0.850, 0.900);
-const SUNLIGHT = vec3f(1.020, 0.960, 0.860);
+const SNOW = vec3f(0.740, 0.770, 0.820);
+const SUNLIGHT = vec3f(1.280, 1.200, 1.060);
 const SKYLIGHT = vec3f(0.170, 0.200, 0.250);
 
 // Ground at a share of the data's range of heights. Forest climbs from the valleys to heath, rock and snow; steep

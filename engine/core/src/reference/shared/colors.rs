@@ -6,10 +6,10 @@ use glam::Vec3;
 
 const MEADOW: Vec3 = Vec3::new(0.150, 0.175, 0.075);
 const FOREST: Vec3 = Vec3::new(0.045, 0.075, 0.035);
-const HEATH: Vec3 = Vec3::new(0.175, 0.150, 0.090);
+const HEATH: Vec3 = Vec3::new(0.160, 0.148, 0.100);
 const ROCK: Vec3 = Vec3::new(0.205, 0.190, 0.175);
-const SNOW: Vec3 = Vec3::new(0.820, 0.850, 0.900);
-const SUNLIGHT: Vec3 = Vec3::new(1.020, 0.960, 0.860);
+const SNOW: Vec3 = Vec3::new(0.740, 0.770, 0.820);
+const SUNLIGHT: Vec3 = Vec3::new(1.280, 1.200, 1.060);
 const SKYLIGHT: Vec3 = Vec3::new(0.170, 0.200, 0.250);
 
 fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
