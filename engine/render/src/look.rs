@@ -26,13 +26,13 @@ pub struct Look {
 }
 
 impl Default for Look {
-    /// Light from the north-west, as on maps.
+    /// Light from the north-west, as on maps; voids are drawn filled.
     fn default() -> Self {
         Self {
             sun: [-0.5, 0.5, 0.707],
             haze: None,
             sky: [0.35, 0.53, 0.78],
-            draw_voids: false,
+            draw_voids: true,
             depth_colors: false,
             wireframe: false,
         }
