@@ -127,6 +127,6 @@ mod tests {
         let [longitude, latitude] = Ellipsoid::WGS84.metres_per_degree(0.0);
         assert!((longitude - 111_319.49).abs() < 0.01 && (latitude - 110_574.28).abs() < 0.01);
         let [longitude, latitude] = Ellipsoid::WGS84.metres_per_degree(45.0);
-        assert!((longitude - 78_846.81).abs() < 0.01 && (latitude - 111_131.78).abs() < 0.01);
+        assert!((longitude - 78_846.835).abs() < 0.01 && (latitude - 111_131.777).abs() < 0.01);
     }
 }
