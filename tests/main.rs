@@ -1,6 +1,7 @@
 //! End-to-end tests, one binary.
 
 mod commands;
+mod embed;
 mod features;
 mod flight;
 mod gpu_parity;
