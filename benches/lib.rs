@@ -8,4 +8,7 @@
     reason = "cages of experiments are numbered in 32 bits by the core"
 )]
 
+pub mod heights;
 pub mod measure;
+pub mod quadtree;
+pub mod terrain_cage;
