@@ -23,9 +23,9 @@ pub const PAPER_QUADS: u64 = 805_293;
 /// Units a side are 2^11: 4 samples of an elevation model of 8192 a unit.
 const UNIT_EXPONENT: u8 = 11;
 
-/// A leaf's urgency is its error times its size to this power: the greater, the more alike are the leaves' sizes and
-/// the fewer the irregular quads.
-pub const URGENCY_EXPONENT: f64 = 0.0;
+/// A leaf's urgency is its error times its size to this power: the less, the more the sizes of neighbours differ. With
+/// it half of the quads of the Moon's cage are irregular (0.44 of them at 0, 0.33 at 0.5).
+const URGENCY_EXPONENT: f64 = -0.3;
 
 /// Places along a leaf's side at which its error is looked for, at most.
 const PROBES: u32 = 16;
