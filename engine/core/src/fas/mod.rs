@@ -30,9 +30,9 @@ mod tables;
 #[cfg(test)]
 mod testing;
 
+pub use crate::subdiv::Real;
 pub use depth::{DepthRule, Feature, Features, MAX_RULE_DEPTH};
 pub use evaluate::Sample;
-pub use execute::Real;
 pub use feature::{FeatureKind, features};
 pub use patch::{Cap, CapRing, Patch, Place, RenderTable};
 pub use rows::{BlendRow, LevelRows, PointCounts};
