@@ -10,5 +10,6 @@
 
 pub mod heights;
 pub mod measure;
+pub mod peer;
 pub mod quadtree;
 pub mod terrain_cage;

@@ -7,9 +7,10 @@
 
 use anyhow::{Context as _, Result};
 use drumlin_core::{
-    cage::{Cage, Faces, NONE, Tags},
+    cage::{Cage, Crease, Faces, NONE, Tags},
     fas::{FeatureKind, features},
 };
+use glam::DVec3;
 use serde::Serialize;
 
 use crate::{
@@ -69,6 +70,35 @@ pub fn cage_counts(cage: &Cage) -> CageCounts {
         features: found().count() as u32,
         feature_valences: found().map(|at| topology.valence(at) as u64).sum(),
     }
+}
+
+/// Semi-sharp creases where the cage bends most: on the twentieth of its inner edges between the most different normals.
+#[must_use]
+pub fn sharpest_edges(cage: &Cage) -> Vec<Crease> {
+    let topology = cage.topology();
+    let normal = |face: u32| {
+        let corners = topology.face_vertices(face);
+        let [a, b, c, d] =
+            [0, 1, 2, 3].map(|at| DVec3::from(cage.positions()[corners[at] as usize]));
+        (c - a).cross(d - b).normalize_or_zero()
+    };
+    let normals: Vec<_> = (0..topology.face_count()).map(normal).collect();
+    let inner = (0..topology.edge_count()).filter(|&edge| !topology.is_boundary_edge(edge));
+    let mut bends: Vec<_> = inner
+        .map(|edge| {
+            let [a, b] = topology.edge_faces(edge).map(|face| normals[face as usize]);
+            (a.dot(b), edge)
+        })
+        .collect();
+    bends.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let sharpest = bends
+        .iter()
+        .take(bends.len() / 20)
+        .map(|&(_, edge)| Crease {
+            vertices: topology.edge_vertices(edge),
+            sharpness: 2.0,
+        });
+    sharpest.collect()
 }
 
 fn terrain_cage_of(heights: &Heights, quads: u64, unit_exponent: u8) -> Result<Cage> {
