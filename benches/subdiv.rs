@@ -15,7 +15,7 @@ use anyhow::{Context as _, Result};
 use clap::Parser;
 use drumlin_benches::{
     heights::Heights,
-    measure::{self, Machine, Table, Timing, median_of, thousands, three_digits},
+    measure::{self, Machine, Table, Timing, thousands, thread_median_of, three_digits},
     peer::{self, PeerFigures, PeerOrder},
     terrain_cage::{CageCounts, PAPER_QUADS, cage_counts, sharpest_edges, terrain_cage},
 };
@@ -165,21 +165,23 @@ fn ours(
     let mut copies: Vec<_> = (0..=runs)
         .map(|_| (cage.positions().to_vec(), faces.clone()))
         .collect();
-    let (link, linked) = median_of(runs, || {
+    let (link, linked) = thread_median_of(runs, || {
         let (positions, faces) = copies.pop().context("a copy a run")?;
         Cage::new(positions, faces, &tags).context("linking the cage")
     });
     let topology = linked?.topology().clone();
-    let (tables_time, tables) = median_of(runs, || Tables::classic(&topology, arguments.depth));
+    let (tables_time, tables) =
+        thread_median_of(runs, || Tables::classic(&topology, arguments.depth));
     let tables = tables.map_err(anyhow::Error::msg)?;
-    let (update, _) = median_of(runs, || tables.execute(&narrow));
-    let (stencils, pattern) = median_of(runs, || LimitPattern::<f32>::new(&topology, places));
+    let (update, _) = thread_median_of(runs, || tables.execute(&narrow));
+    let (stencils, pattern) =
+        thread_median_of(runs, || LimitPattern::<f32>::new(&topology, places));
     let pattern = pattern?;
     let place_count = topology.face_count() as usize * places.len();
     let mut out = [0, 1, 2].map(|_| vec![[0.0_f32; 3]; place_count]);
     let [at, du, dv] = &mut out;
-    let (derivatives, ()) = median_of(runs, || pattern.jets_into(&narrow, [at, du, dv]));
-    let (positions, ()) = median_of(runs, || pattern.positions_into(&narrow, at));
+    let (derivatives, ()) = thread_median_of(runs, || pattern.jets_into(&narrow, [at, du, dv]));
+    let (positions, ()) = thread_median_of(runs, || pattern.positions_into(&narrow, at));
     let exact = LimitPattern::<f64>::new(&topology, places)?.positions(cage.positions());
     let exact: Vec<_> = exact.iter().map(|at| at.map(|x| x as f32)).collect();
     let off = spread(&distances(at, &exact, cage.extent()))[1];
