@@ -61,7 +61,7 @@ pub fn cage_counts(cage: &Cage) -> CageCounts {
     let kinds = features(topology);
     let is_feature = |&vertex: &u32| kinds[vertex as usize] != FeatureKind::Regular;
     let irregular = (0..topology.face_count())
-        .filter(|&face| topology.face_vertices(face).iter().any(|at| is_feature(at)));
+        .filter(|&face| topology.face_vertices(face).iter().any(is_feature));
     let found = || (0..topology.vertex_count()).filter(is_feature);
     CageCounts {
         faces: topology.face_count(),
