@@ -18,6 +18,7 @@
     reason = "cages have fewer than 2^32 corners (checked by `Cage::new`), corners and sides fewer than five"
 )]
 
+mod blocks;
 mod depth;
 mod evaluate;
 mod execute;
@@ -30,6 +31,7 @@ mod tables;
 #[cfg(test)]
 mod testing;
 
+pub use blocks::{Blocks, CapEntry, Changes, Entry, Piece, Positions};
 pub use depth::{DepthRule, Feature, Features, MAX_RULE_DEPTH};
 pub use evaluate::Sample;
 pub use execute::Real;

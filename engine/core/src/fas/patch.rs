@@ -29,7 +29,8 @@ pub struct Place {
 }
 
 impl Place {
-    fn child(self, corner: u8) -> Self {
+    /// The quarter at a corner of the patch.
+    pub(super) fn child(self, corner: u8) -> Self {
         let [du, dv] = [[0, 0], [1, 0], [1, 1], [0, 1]][corner as usize];
         Self {
             face: self.face,
@@ -125,7 +126,11 @@ pub(super) fn add_patches(source: &Source<'_>, rows: &mut LevelRows, table: &mut
         } else {
             let mut grid = match source.above {
                 None => own_grid(mesh, face, sharp),
-                Some((above, children)) => child_grid(above, children, mesh, face, sharp),
+                Some((above, children)) => {
+                    let (parent, corner) = mesh.parents[face];
+                    let own = [0, 1, 2, 3].map(|corner| mesh.point(face, corner));
+                    child_grid(above, children, (parent as usize, corner as usize), own, sharp)
+                }
             };
             fill_phantoms(&mut grid, sharp, rows);
             table.patches.push(Patch {
@@ -158,7 +163,7 @@ fn finer_sides(source: &Source<'_>, face: usize) -> u8 {
     (0..4).map(|side| u8::from(finer(side)) << side).sum()
 }
 
-fn sharp_sides(mesh: &Mesh, face: usize) -> u8 {
+pub(super) fn sharp_sides(mesh: &Mesh, face: usize) -> u8 {
     (0..4)
         .map(|side| u8::from(mesh.sharpness(face, side) == f32::INFINITY) << side)
         .sum()
@@ -177,7 +182,7 @@ fn put(grid: &mut [u32; 16], corner: usize, beyond: [u32; 3]) {
 }
 
 /// Controls from a level's own faces; [`NONE`] beyond sharp sides.
-fn own_grid(mesh: &Mesh, face: usize, sharp: u8) -> [u32; 16] {
+pub(super) fn own_grid(mesh: &Mesh, face: usize, sharp: u8) -> [u32; 16] {
     let mut grid = [NONE; 16];
     for corner in 0..4 {
         grid[CORNERS[corner].0] = mesh.point(face, corner);
@@ -199,19 +204,18 @@ fn own_grid(mesh: &Mesh, face: usize, sharp: u8) -> [u32; 16] {
     grid
 }
 
-/// Controls of a child from the points its parent's neighbourhood gave; [`NONE`] beyond sharp sides.
-fn child_grid(
+/// Controls of child `c` of face `f` from the points its parent's neighbourhood gave, its own corners `own`; [`NONE`]
+/// beyond sharp sides.
+pub(super) fn child_grid(
     above: &Mesh,
     children: &Children,
-    mesh: &Mesh,
-    child: usize,
+    (f, c): (usize, usize),
+    own: [u32; 4],
     sharp: u8,
 ) -> [u32; 16] {
-    let (parent, c) = mesh.parents[child];
-    let (f, c) = (parent as usize, c as usize);
     let mut grid = [NONE; 16];
     for corner in 0..4 {
-        grid[CORNERS[corner].0] = mesh.point(child, corner);
+        grid[CORNERS[corner].0] = own[corner];
     }
     let vertex = |corner: usize| children.vertex[above.corners[f][corner] as usize];
     let before = neighbour(
@@ -313,7 +317,7 @@ fn fill_phantoms(grid: &mut [u32; 16], sharp: u8, rows: &mut LevelRows) {
 }
 
 /// The sector of faces around a cap's corner, between infinitely sharp edges.
-fn cap_ring(mesh: &Mesh, face: usize, corner: usize) -> CapRing {
+pub(super) fn cap_ring(mesh: &Mesh, face: usize, corner: usize) -> CapRing {
     let vertex = mesh.corners[face][corner];
     let mut corners = Vec::new();
     let closed = mesh.ring(vertex, &mut corners);
