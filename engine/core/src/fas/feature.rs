@@ -104,7 +104,11 @@ impl SemiSharpLines {
             let (mut line, mut next) = (vec![vertex], 0);
             while let Some(&at) = line.get(next) {
                 next += 1;
-                for &edge in topology.vertex_edges(at).iter().filter(|&&edge| is_semi_edge(edge)) {
+                for &edge in topology
+                    .vertex_edges(at)
+                    .iter()
+                    .filter(|&&edge| is_semi_edge(edge))
+                {
                     let end = topology.edge_end(edge, at);
                     if !std::mem::replace(&mut seen[end as usize], true) {
                         line.push(end);

@@ -19,6 +19,7 @@
 )]
 
 mod blocks;
+mod cap;
 mod depth;
 mod evaluate;
 mod execute;
@@ -32,10 +33,11 @@ mod tables;
 mod testing;
 
 pub use blocks::{Blocks, CapEntry, Changes, Entry, Piece, Positions};
+pub use cap::{Cap, CapRing};
 pub use depth::{DepthRule, Feature, Features, MAX_RULE_DEPTH};
 pub use evaluate::Sample;
 pub use execute::Real;
 pub use feature::{FeatureKind, features};
-pub use patch::{Cap, CapRing, Patch, Place, RenderTable};
+pub use patch::{Patch, Place, RenderTable};
 pub use rows::{BlendRow, LevelRows, PointCounts};
 pub use tables::{MAX_DEPTH, Tables};

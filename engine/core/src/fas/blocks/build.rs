@@ -59,7 +59,9 @@ impl Blocks {
     fn add_blocks(&mut self) {
         let mut known = HashMap::new();
         let mut corners = Vec::new();
-        for vertex in (0..self.mesh.start.len() as u32).filter(|&at| self.mesh.extraordinary[at as usize]) {
+        for vertex in
+            (0..self.mesh.start.len() as u32).filter(|&at| self.mesh.extraordinary[at as usize])
+        {
             let is_closed = self.mesh.ring(vertex, &mut corners);
             let shape = shape(&self.mesh, vertex, &corners, is_closed);
             let template = *known.entry(shape).or_insert_with_key(|shape| {
@@ -73,7 +75,8 @@ impl Blocks {
                 first_point: NONE,
             });
             self.rings.extend_from_slice(&corners);
-            self.first.inner_points(&self.mesh, &corners, is_closed, &mut self.rings);
+            self.first
+                .inner_points(&self.mesh, &corners, is_closed, &mut self.rings);
         }
     }
 }

@@ -118,7 +118,11 @@ impl<T: Real> Piece<T> {
     #[must_use]
     pub fn evaluate(&self, uv: [f64; 2]) -> Sample<T> {
         if self.is_cap {
-            tensor(&self.controls, uv.map(bernstein), uv.map(bernstein_derivative))
+            tensor(
+                &self.controls,
+                uv.map(bernstein),
+                uv.map(bernstein_derivative),
+            )
         } else {
             tensor(&self.controls, uv.map(basis), uv.map(basis_derivative))
         }

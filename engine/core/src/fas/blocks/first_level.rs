@@ -38,11 +38,6 @@ impl FirstLevel {
         }
     }
 
-    /// True for a corner of a refined face.
-    pub(super) fn is_wanted(&self, vertex: u32) -> bool {
-        self.wanted[vertex as usize]
-    }
-
     /// Finds anew what is in use.
     pub(super) fn want_all(&mut self, mesh: &Mesh) {
         self.wanted.fill(false);
@@ -82,14 +77,24 @@ impl FirstLevel {
     pub(super) fn used_count(&self) -> u32 {
         let rows = &self.rows;
         let faces = rows.faces.iter().filter(|row| self.is_used(*row)).count();
-        let edges = rows.edges.iter().filter(|row| self.is_used(&row[..2])).count();
+        let edges = rows
+            .edges
+            .iter()
+            .filter(|row| self.is_used(&row[..2]))
+            .count();
         let vertex = |index: &usize| self.is_used(&rows.vertex_row(*index)[..1]);
         let vertices = (0..rows.counts().vertex as usize).filter(vertex).count();
         (faces + edges + vertices) as u32
     }
 
     /// The level-1 points within 2 of a feature, in the numbers of its lattice.
-    pub(super) fn inner_points(&self, mesh: &Mesh, corners: &[u32], is_closed: bool, points: &mut Vec<u32>) {
+    pub(super) fn inner_points(
+        &self,
+        mesh: &Mesh,
+        corners: &[u32],
+        is_closed: bool,
+        points: &mut Vec<u32>,
+    ) {
         let Children {
             face: faces,
             side: sides,
@@ -105,7 +110,10 @@ impl FirstLevel {
             points.extend([sides[face][corner], vertex(face, next(corner))]);
         }
         if let (false, Some((face, corner))) = (is_closed, places().next_back()) {
-            points.extend([sides[face][previous(corner)], vertex(face, previous(corner))]);
+            points.extend([
+                sides[face][previous(corner)],
+                vertex(face, previous(corner)),
+            ]);
         }
         for (face, corner) in places() {
             let across = (corner + 2) % 4;

@@ -88,7 +88,11 @@ impl Lattice {
 
     /// The spoke, and sector, before one.
     pub(super) const fn before(self, index: u32) -> u32 {
-        if index == 0 { self.spokes - 1 } else { index - 1 }
+        if index == 0 {
+            self.spokes - 1
+        } else {
+            index - 1
+        }
     }
 }
 
@@ -98,12 +102,22 @@ mod tests {
 
     #[test]
     fn every_place_has_a_number_of_its_own_and_inner_ones_come_first() {
-        for (spokes, is_closed) in [(1, true), (3, true), (4, true), (12, true), (2, false), (5, false)] {
+        for (spokes, is_closed) in [
+            (1, true),
+            (3, true),
+            (4, true),
+            (12, true),
+            (2, false),
+            (5, false),
+        ] {
             let lattice = Lattice { spokes, is_closed };
             let mut seen = vec![false; lattice.points() as usize];
             let mut number = |point: u32, is_inner: bool| {
                 assert_eq!(point < lattice.inner_points(), is_inner);
-                assert!(!std::mem::replace(&mut seen[point as usize], true), "{point} twice");
+                assert!(
+                    !std::mem::replace(&mut seen[point as usize], true),
+                    "{point} twice"
+                );
             };
             number(0, true);
             for spoke in 0..spokes {
@@ -121,7 +135,10 @@ mod tests {
     #[test]
     fn a_level_around_a_whole_ring_has_twelve_n_and_one_points() {
         for spokes in 1..20 {
-            let lattice = Lattice { spokes, is_closed: true };
+            let lattice = Lattice {
+                spokes,
+                is_closed: true,
+            };
             assert_eq!(lattice.points(), 12 * spokes + 1);
             assert_eq!(lattice.inner_points(), 6 * spokes + 1);
         }
@@ -129,7 +146,10 @@ mod tests {
 
     #[test]
     fn sectors_share_their_spokes() {
-        let lattice = Lattice { spokes: 5, is_closed: true };
+        let lattice = Lattice {
+            spokes: 5,
+            is_closed: true,
+        };
         for sector in 0..5 {
             for distance in 0..4 {
                 let next = lattice.at(lattice.after(sector), distance, 0);

@@ -27,10 +27,10 @@ mod lattice;
 mod positions;
 mod runs;
 mod template;
-mod turn;
-mod visit;
 #[cfg(test)]
 mod tests;
+mod turn;
+mod visit;
 
 use self::{first_level::FirstLevel, runs::Runs, template::Template};
 use super::{
@@ -158,7 +158,9 @@ impl Blocks {
         }
         self.set_line_depths(depths, &mut crossed, &mut changes);
         self.want(&crossed, &mut changes);
-        if self.runs.free_points() > self.runs.end() - self.first.rows.end_point() - self.runs.free_points() {
+        if self.runs.free_points()
+            > self.runs.end() - self.first.rows.end_point() - self.runs.free_points()
+        {
             self.compact(&mut changes);
         }
         Ok(changes)
@@ -184,8 +186,15 @@ impl Blocks {
     /// Points that refinement makes.
     #[must_use]
     pub fn refined_point_count(&self) -> u32 {
-        let below: u32 = self.laid().map(|block| self.run_length(block, self.depth(block.vertex))).sum();
-        let lines = self.semi_sharp.tables.as_ref().map_or(0, Tables::refined_point_count);
+        let below: u32 = self
+            .laid()
+            .map(|block| self.run_length(block, self.depth(block.vertex)))
+            .sum();
+        let lines = self
+            .semi_sharp
+            .tables
+            .as_ref()
+            .map_or(0, Tables::refined_point_count);
         self.first.used_count() + below + lines
     }
 
@@ -206,12 +215,20 @@ impl Blocks {
             + size_of_val(self.rings.as_slice())
             + self.semi_sharp.on_line.len()
             + self.semi_sharp.worn.len()
-            + self.semi_sharp.tables.as_ref().map_or(0, Tables::byte_count)
+            + self
+                .semi_sharp
+                .tables
+                .as_ref()
+                .map_or(0, Tables::byte_count)
     }
 
     /// Points of blocks at other depths, those around semi-sharp lines as they are.
     fn points_at(&self, depths: &[u8]) -> u64 {
-        let lines = self.semi_sharp.tables.as_ref().map_or(0, Tables::made_point_count);
+        let lines = self
+            .semi_sharp
+            .tables
+            .as_ref()
+            .map_or(0, Tables::made_point_count);
         let blocks = self.laid().map(|block| {
             let depth = depths[block.vertex as usize];
             u64::from(depth.saturating_sub(1)) * u64::from(self.template(block).lattice.points())
@@ -221,7 +238,9 @@ impl Blocks {
 
     /// Blocks whose levels from 2 on are laid by the closed form.
     fn laid(&self) -> impl Iterator<Item = &Block> {
-        self.blocks.iter().filter(|block| !self.is_on_line(block.vertex))
+        self.blocks
+            .iter()
+            .filter(|block| !self.is_on_line(block.vertex))
     }
 
     /// Points of a block's levels from 2 on.
@@ -231,7 +250,8 @@ impl Blocks {
 
     fn move_block(&mut self, index: usize, old: u8, new: u8) {
         let block = self.blocks[index];
-        self.runs.give(block.first_point, self.run_length(&block, old));
+        self.runs
+            .give(block.first_point, self.run_length(&block, old));
         self.blocks[index].first_point = self.runs.take(self.run_length(&block, new));
     }
 

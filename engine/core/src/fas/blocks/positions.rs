@@ -52,7 +52,8 @@ impl<T: Real> Positions<T> {
     /// # Panics
     /// When the positions are not those of `blocks` before the change.
     pub fn update(&mut self, blocks: &Blocks, changes: &Changes) {
-        self.points.resize(blocks.point_count() as usize, [T::default(); 3]);
+        self.points
+            .resize(blocks.point_count() as usize, [T::default(); 3]);
         if changes.all {
             return self.make_all(blocks);
         }
@@ -159,7 +160,12 @@ impl<T: Real> Positions<T> {
 }
 
 /// Makes the points of blocks in the order they lie in `points`, the first of which is numbered `first`.
-fn make_runs<T: Real>(blocks: &Blocks, list: &[u32], above: &[[T; 3]], (first, points): (usize, &mut [[T; 3]])) {
+fn make_runs<T: Real>(
+    blocks: &Blocks,
+    list: &[u32],
+    above: &[[T; 3]],
+    (first, points): (usize, &mut [[T; 3]]),
+) {
     if list.len() > BLOCKS_A_TASK {
         let (left, right) = list.split_at(list.len() / 2);
         let middle = blocks.blocks[right[0] as usize].first_point as usize;
@@ -176,9 +182,16 @@ fn make_runs<T: Real>(blocks: &Blocks, list: &[u32], above: &[[T; 3]], (first, p
         let template = blocks.template(block);
         let start = block.first_point as usize - first;
         let length = blocks.run_length(block, blocks.depth(block.vertex)) as usize;
-        let mut levels = points[start..start + length].chunks_exact_mut(template.lattice.points() as usize);
+        let mut levels =
+            points[start..start + length].chunks_exact_mut(template.lattice.points() as usize);
         inner.clear();
-        inner.extend(blocks.ring(block).1.iter().map(|&point| above[point as usize]));
+        inner.extend(
+            blocks
+                .ring(block)
+                .1
+                .iter()
+                .map(|&point| above[point as usize]),
+        );
         let Some(mut level) = levels.next() else {
             continue;
         };

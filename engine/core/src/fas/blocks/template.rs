@@ -227,8 +227,7 @@ impl Template {
         let row = VertexRow {
             point: point(x, y),
             vertex: point(x / 2, y / 2),
-            ends: [[1, 0], [0, 1], [-1, 0], [0, -1]]
-                .map(|[dx, dy]| point(x / 2 + dx, y / 2 + dy)),
+            ends: [[1, 0], [0, 1], [-1, 0], [0, -1]].map(|[dx, dy]| point(x / 2 + dx, y / 2 + dy)),
             faces: [[1, 1], [-1, 1], [-1, -1], [1, -1]].map(|[dx, dy]| point(x + dx, y + dy)),
         };
         self.vertices.push(row);
@@ -251,7 +250,10 @@ impl Shape {
 }
 
 fn patch(lattice: Lattice, shape: &Shape, sector: u32, cell: [u16; 2]) -> Patch {
-    let (x_border, y_border) = (shape.is_border(sector), shape.is_border(lattice.after(sector)));
+    let (x_border, y_border) = (
+        shape.is_border(sector),
+        shape.is_border(lattice.after(sector)),
+    );
     let [low_x, low_y] = cell.map(|low| i32::from(low) - 1);
     let (below, left) = (x_border && cell[1] == 0, y_border && cell[0] == 0);
     let controls = std::array::from_fn(|index| {
@@ -295,7 +297,16 @@ fn cap(lattice: Lattice, shape: &Shape, sector: u32) -> Cap {
 /// The ring of a cap's regular corner; only this side of it where a sharp spoke runs through it.
 fn regular_ring(lattice: Lattice, sector: u32, [x, y]: [i32; 2], is_sharp: bool) -> CapRing {
     // Counter-clockwise, ends and diagonals in turn. One that lies on a spoke begins along it, on this side.
-    let around = [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]];
+    let around = [
+        [1, 0],
+        [1, 1],
+        [0, 1],
+        [-1, 1],
+        [-1, 0],
+        [-1, -1],
+        [0, -1],
+        [1, -1],
+    ];
     let first = if y == 0 { 0 } else { 6 };
     let point = |index: usize| {
         let [dx, dy] = around[(first + index) % 8];
@@ -326,7 +337,11 @@ fn feature_ring(lattice: Lattice, shape: &Shape, sector: u32) -> CapRing {
     }
     let mut spokes = vec![first];
     let mut spoke = lattice.after(first);
-    while if is_whole { spoke != first } else { !shape.ends_sector(spoke) } {
+    while if is_whole {
+        spoke != first
+    } else {
+        !shape.ends_sector(spoke)
+    } {
         spokes.push(spoke);
         spoke = lattice.after(spoke);
     }
@@ -336,7 +351,10 @@ fn feature_ring(lattice: Lattice, shape: &Shape, sector: u32) -> CapRing {
     }
     CapRing {
         vertex: 0,
-        ends: spokes.iter().map(|&spoke| lattice.spoke(spoke, 1)).collect(),
+        ends: spokes
+            .iter()
+            .map(|&spoke| lattice.spoke(spoke, 1))
+            .collect(),
         own: faces.iter().position(|&face| face == sector).unwrap_or(0),
         diagonals: faces.iter().map(|&face| lattice.at(face, 1, 1)).collect(),
         closed: is_whole,

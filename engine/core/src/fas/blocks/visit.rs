@@ -7,9 +7,10 @@ use std::{borrow::Cow, ops::Range};
 
 use super::super::{
     Cap, Patch, Place,
+    cap::own_rings,
     execute::Real,
     mesh::{ABSENT, Mesh, next, previous},
-    patch::{cap_ring, own_grid, sharp_sides},
+    patch::{own_grid, sharp_sides},
 };
 use super::{Block, Blocks, CapEntry, Entry, Piece, Positions, entry::Numbers, turn::Turn};
 use crate::cage::NONE;
@@ -38,7 +39,9 @@ impl Blocks {
             range(part, self.mesh.face_count()).for_each(|face| self.visit_face(face, visit));
         } else if part < faces + blocks {
             let blocks = &self.blocks[range(part - faces, self.blocks.len())];
-            blocks.iter().for_each(|block| self.visit_block(block, visit));
+            blocks
+                .iter()
+                .for_each(|block| self.visit_block(block, visit));
         } else {
             self.visit_lines(visit);
         }
@@ -113,7 +116,7 @@ impl Blocks {
             place,
             finer,
             sharp,
-            rings: [0, 1, 2, 3].map(|corner| cap_ring(mesh, face, corner)),
+            rings: own_rings(mesh, face),
         };
         visit(&Entry::Cap(CapEntry {
             place,
@@ -148,7 +151,13 @@ impl Blocks {
     }
 
     /// A sector's patches from level 2 on, and its cap.
-    fn visit_sector(&self, block: &Block, (sector, face, turn): (usize, usize, Turn), depth: u8, visit: Visit<'_>) {
+    fn visit_sector(
+        &self,
+        block: &Block,
+        (sector, face, turn): (usize, usize, Turn),
+        depth: u8,
+        visit: Visit<'_>,
+    ) {
         let template = self.template(block);
         let mut first = block.first_point;
         let place = |level: u8, cell: [u16; 2]| {
@@ -162,11 +171,17 @@ impl Blocks {
         };
         for level in 2..=depth {
             for patch in &template.patches[sector] {
-                let controls = patch.controls.map(|point| if point == NONE { NONE } else { first + point });
+                let controls = patch
+                    .controls
+                    .map(|point| if point == NONE { NONE } else { first + point });
                 visit(&Entry::Patch(Cow::Owned(Patch {
                     place: place(level, [patch.place.u, patch.place.v]),
                     controls: turn.grid(controls),
-                    finer: if level < depth { turn.sides(patch.finer) } else { 0 },
+                    finer: if level < depth {
+                        turn.sides(patch.finer)
+                    } else {
+                        0
+                    },
                     sharp: turn.sides(patch.sharp),
                 })));
             }
@@ -203,7 +218,9 @@ impl Blocks {
     fn is_child_refined(&self, vertex: u32) -> bool {
         let depth = self.depth(vertex);
         let is_feature = depth != Mesh::REGULAR;
-        is_feature && depth > 1 && !(self.is_on_line(vertex) && self.semi_sharp.worn[vertex as usize])
+        is_feature
+            && depth > 1
+            && !(self.is_on_line(vertex) && self.semi_sharp.worn[vertex as usize])
     }
 
     /// Finer sides of a child that is not refined itself: only children of the same face can be beyond them, as those of
