@@ -21,7 +21,7 @@ use drumlin_benches::{
 };
 use drumlin_core::{
     cage::{Cage, Crease, LimitPattern, Tags},
-    fas::Tables,
+    fas::{Blocks, Positions},
 };
 use serde::Serialize;
 
@@ -170,10 +170,14 @@ fn ours(
         Cage::new(positions, faces, &tags).context("linking the cage")
     });
     let topology = linked?.topology().clone();
-    let (tables_time, tables) =
-        thread_median_of(runs, || Tables::classic(&topology, arguments.depth));
+    let depths = vec![arguments.depth; topology.vertex_count() as usize];
+    let (tables_time, tables) = thread_median_of(runs, || {
+        let mut blocks = Blocks::new(&topology)?;
+        blocks.set_depths(&depths).map(|_| blocks)
+    });
     let tables = tables.map_err(anyhow::Error::msg)?;
-    let (update, _) = thread_median_of(runs, || tables.execute(&narrow));
+    let mut points = Positions::new(&tables, &narrow);
+    let (update, ()) = thread_median_of(runs, || points.execute(&tables, &narrow));
     let (stencils, pattern) =
         thread_median_of(runs, || LimitPattern::<f32>::new(&topology, places));
     let pattern = pattern?;
@@ -195,7 +199,7 @@ fn ours(
         table_bytes: tables.byte_count() as u64,
         link_bytes: topology.byte_count() as u64,
         refined_points: u64::from(tables.refined_point_count()),
-        patches: (tables.render.patches.len() + tables.render.caps.len()) as u64,
+        patches: u64::from(tables.patch_count()),
         places: place_count as u64,
     };
     let [at, ..] = out;

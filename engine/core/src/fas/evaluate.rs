@@ -49,6 +49,11 @@ impl Cap {
     /// The sixteen Bézier controls, rows of v.
     #[must_use]
     pub fn controls<T: Real>(&self, points: &[[T; 3]]) -> [[T; 3]; 16] {
+        self.controls_of(&|point| points[point as usize])
+    }
+
+    /// The same of points that are looked up.
+    pub(super) fn controls_of<T: Real>(&self, points: &impl Fn(u32) -> [T; 3]) -> [[T; 3]; 16] {
         let mut controls = [[T::default(); 3]; 16];
         // Corner, towards the next corner, towards the previous one, inside.
         const PLACES: [[usize; 4]; 4] =
@@ -92,8 +97,8 @@ impl CapRing {
     }
 
     /// The exact limit of the vertex: smooth, along the sharp edges that end the sector, or in place.
-    fn limit<T: Real>(&self, points: &[[T; 3]]) -> [T; 3] {
-        let vertex = points[self.vertex as usize];
+    fn limit<T: Real>(&self, points: &impl Fn(u32) -> [T; 3]) -> [T; 3] {
+        let vertex = points(self.vertex);
         if self.corner {
             return vertex;
         }
@@ -117,12 +122,12 @@ impl CapRing {
             .chain(self.diagonals.iter().map(|&at| (at, unit)));
         ring.fold(
             scale(T::of(n * n * unit), vertex),
-            |sum, (point, weight)| add(sum, scale(T::of(weight), points[point as usize])),
+            |sum, (point, weight)| add(sum, scale(T::of(weight), points(point))),
         )
     }
 
     /// The Bézier control inside face `face` of the sector.
-    fn inner_control<T: Real>(&self, points: &[[T; 3]], face: usize) -> [T; 3] {
+    fn inner_control<T: Real>(&self, points: &impl Fn(u32) -> [T; 3], face: usize) -> [T; 3] {
         let n = if self.corner { 4.0 } else { self.valence() };
         let unit = 1.0 / (n + 5.0);
         weighted(
@@ -138,7 +143,7 @@ impl CapRing {
 
     /// The Bézier control on edge `end` of the sector: the mean of the inner ones beside it, or a third along a sharp
     /// edge.
-    fn edge_control<T: Real>(&self, points: &[[T; 3]], end: usize) -> [T; 3] {
+    fn edge_control<T: Real>(&self, points: &impl Fn(u32) -> [T; 3], end: usize) -> [T; 3] {
         let faces = self.diagonals.len();
         let sharp = !self.closed && (end == 0 || end == faces);
         if sharp || self.corner {
@@ -152,15 +157,15 @@ impl CapRing {
     }
 }
 
-fn weighted<T: Real>(points: &[[T; 3]], weights: &[(u32, f64)]) -> [T; 3] {
+fn weighted<T: Real>(points: &impl Fn(u32) -> [T; 3], weights: &[(u32, f64)]) -> [T; 3] {
     weights
         .iter()
         .fold([T::default(); 3], |sum, &(point, weight)| {
-            add(sum, scale(T::of(weight), points[point as usize]))
+            add(sum, scale(T::of(weight), points(point)))
         })
 }
 
-fn tensor<T: Real>(
+pub(super) fn tensor<T: Real>(
     controls: &[[T; 3]; 16],
     basis: [[f64; 4]; 2],
     slope: [[f64; 4]; 2],
@@ -180,12 +185,12 @@ fn tensor<T: Real>(
     sample
 }
 
-fn bernstein(t: f64) -> [f64; 4] {
+pub(super) fn bernstein(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
     [s * s * s, 3.0 * s * s * t, 3.0 * s * t * t, t * t * t]
 }
 
-fn bernstein_derivative(t: f64) -> [f64; 4] {
+pub(super) fn bernstein_derivative(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
     [
         -3.0 * s * s,

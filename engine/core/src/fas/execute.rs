@@ -8,7 +8,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::{LevelRows, Tables};
-use crate::subdiv::Real;
+pub(super) use crate::subdiv::Real;
 
 /// Rows a task: large enough to be worth one, small enough to share.
 const ROWS_A_TASK: usize = 4096;
@@ -31,32 +31,29 @@ impl Tables {
 }
 
 /// Makes a level's points; those before it are there.
-fn execute_level<T: Real>(rows: &LevelRows, points: &mut [[T; 3]]) {
-    let quarter = T::of(0.25);
+pub(super) fn execute_level<T: Real>(rows: &LevelRows, points: &mut [[T; 3]]) {
     let first = rows.first_point as usize;
     let edges = first + rows.faces.len();
     let vertices = edges + rows.edges.len();
     let end = vertices + rows.counts().vertex as usize;
-    let mean = |points: &[[T; 3]], row: &[u32; 4]| scale(quarter, sum(points, row));
-    gather(points, first..edges, |points, index| {
-        mean(points, &rows.faces[index])
+    gather(points, first..edges, |points, index, target| {
+        *target = face_point(points, &rows.faces[index]);
     });
-    gather(points, edges..vertices, |points, index| {
-        mean(points, &rows.edges[index])
+    gather(points, edges..vertices, |points, index, target| {
+        *target = edge_point(points, &rows.edges[index]);
     });
-    execute_blends(rows, first..vertices, points);
-    gather(points, vertices..end, |points, index| {
-        vertex_point(points, rows.vertex_row(index))
+    gather(points, vertices..end, |points, index, target| {
+        *target = vertex_point(points, rows.vertex_row(index));
     });
-    execute_blends(rows, vertices..end, points);
+    execute_blends(rows, points);
     execute_phantoms(rows, points);
 }
 
 /// Fills a range of points by a function of the points before it and the index in the range.
-fn gather<T: Real>(
+pub(super) fn gather<T: Real>(
     points: &mut [[T; 3]],
     range: Range<usize>,
-    point: impl Fn(&[[T; 3]], usize) -> [T; 3] + Sync,
+    fill: impl Fn(&[[T; 3]], usize, &mut [T; 3]) + Sync,
 ) {
     let (before, rest) = points.split_at_mut(range.start);
     let before = &*before;
@@ -65,35 +62,69 @@ fn gather<T: Real>(
         .enumerate()
         .for_each(|(task, chunk)| {
             for (offset, target) in chunk.iter_mut().enumerate() {
-                *target = point(before, task * ROWS_A_TASK + offset);
+                fill(before, task * ROWS_A_TASK + offset, target);
             }
         });
 }
 
-fn vertex_point<T: Real>(points: &[[T; 3]], row: &[u32]) -> [T; 3] {
-    let vertex = points[row[0] as usize];
+/// The point of a face row.
+pub(super) fn face_point<T: Real>(points: &[[T; 3]], row: &[u32; 4]) -> [T; 3] {
+    mean(row.map(|point| points[point as usize]))
+}
+
+/// The point of an edge row.
+pub(super) fn edge_point<T: Real>(points: &[[T; 3]], row: &[u32; 4]) -> [T; 3] {
+    let [a, b, f, g] = row.map(|point| points[point as usize]);
+    mean([a, f, b, g])
+}
+
+/// The point of a vertex row.
+pub(super) fn vertex_point<T: Real>(points: &[[T; 3]], row: &[u32]) -> [T; 3] {
+    let at = |index: usize| points[row[index] as usize];
     match row.len() {
-        1 => vertex,
-        3 => add(
-            scale(T::of(0.75), vertex),
-            scale(T::of(0.125), sum(points, &row[1..])),
-        ),
-        length => {
-            let n = (length / 2) as f64;
-            add(
-                scale(T::of((n - 2.0) / n), vertex),
-                scale(T::of(1.0 / (n * n)), sum(points, &row[1..])),
-            )
-        }
+        1 => at(0),
+        3 => crease_point(at(0), [at(1), at(2)]),
+        length => smooth_point(at(0), length / 2, |i| at(1 + 2 * i), |i| at(2 + 2 * i)),
     }
 }
 
-fn execute_blends<T: Real>(rows: &LevelRows, range: Range<usize>, points: &mut [[T; 3]]) {
-    for row in rows
-        .blends
-        .iter()
-        .filter(|row| range.contains(&(row.point as usize)))
-    {
+/// The mean of four points around something; the same bits wherever the walk around it begins and whichever way it
+/// goes, so that copies of a point are equal.
+pub(super) fn mean<T: Real>([a, b, c, d]: [[T; 3]; 4]) -> [T; 3] {
+    scale(T::of(0.25), add(add(a, c), add(b, d)))
+}
+
+/// The vertex point on a crease that runs to two ends.
+pub(super) fn crease_point<T: Real>(vertex: [T; 3], [a, b]: [[T; 3]; 2]) -> [T; 3] {
+    add(scale(T::of(0.75), vertex), scale(T::of(0.125), add(a, b)))
+}
+
+/// The smooth vertex point of a vertex with `valence` ends of edges and face points in ring order.
+pub(super) fn smooth_point<T: Real>(
+    vertex: [T; 3],
+    valence: usize,
+    end: impl Fn(usize) -> [T; 3],
+    face: impl Fn(usize) -> [T; 3],
+) -> [T; 3] {
+    let n = valence as f64;
+    let ring = add(ring_sum(valence, end), ring_sum(valence, face));
+    add(
+        scale(T::of((n - 2.0) / n), vertex),
+        scale(T::of(1.0 / (n * n)), ring),
+    )
+}
+
+/// The sum of what lies around a vertex; of four, the same bits wherever the ring begins.
+fn ring_sum<T: Real>(valence: usize, at: impl Fn(usize) -> [T; 3]) -> [T; 3] {
+    if valence == 4 {
+        return add(add(at(0), at(2)), add(at(1), at(3)));
+    }
+    (0..valence).fold([T::default(); 3], |sum, index| add(sum, at(index)))
+}
+
+/// Makes the points that are gathered by explicit weights. They gather none of each other.
+pub(super) fn execute_blends<T: Real>(rows: &LevelRows, points: &mut [[T; 3]]) {
+    for row in &rows.blends {
         let zero = [T::default(); 3];
         points[row.point as usize] = row.weights.iter().fold(zero, |sum, &(point, weight)| {
             add(sum, scale(T::of(weight), points[point as usize]))
@@ -107,12 +138,6 @@ fn execute_phantoms<T: Real>(rows: &LevelRows, points: &mut [[T; 3]]) {
         let [border, within] = [points[border as usize], points[within as usize]];
         points[point as usize] = [0, 1, 2].map(|axis| border[axis] + border[axis] - within[axis]);
     }
-}
-
-fn sum<T: Real>(points: &[[T; 3]], row: &[u32]) -> [T; 3] {
-    row.iter().fold([T::default(); 3], |sum, &point| {
-        add(sum, points[point as usize])
-    })
 }
 
 pub(super) fn add<T: Real>(a: [T; 3], b: [T; 3]) -> [T; 3] {

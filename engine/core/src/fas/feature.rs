@@ -79,28 +79,63 @@ fn infinite_part(sharpness: f32) -> f32 {
     }
 }
 
-/// Raises depths so that the vertices of every semi-sharp line agree on the greatest among them.
-pub(super) fn level_semi_sharp_lines(topology: &Topology, depths: &mut [u8]) {
-    let semi: Vec<[u32; 2]> = (0..topology.edge_count())
-        .filter(|&edge| {
-            let sharpness = topology.edge_sharpness(edge);
-            sharpness > 0.0 && sharpness.is_finite()
-        })
-        .map(|edge| topology.edge_vertices(edge))
-        .collect();
-    let mut changed = true;
-    while changed {
-        changed = false;
-        for [a, b] in semi
-            .iter()
-            .chain(semi.iter().rev())
-            .map(|ends| ends.map(|end| end as usize))
-        {
-            let depth = depths[a].max(depths[b]);
-            changed |= depths[a] != depths[b];
-            depths[a] = depth;
-            depths[b] = depth;
+/// The semi-sharp lines of a cage, one list of vertices each: all that semi-sharp edges join, and vertices that are
+/// semi-sharp alone.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SemiSharpLines {
+    lines: Vec<Vec<u32>>,
+}
+
+impl SemiSharpLines {
+    /// Finds them.
+    pub(super) fn of(topology: &Topology) -> Self {
+        let semi = |sharpness: f64| sharpness > 0.0 && sharpness.is_finite();
+        let is_semi_edge = |edge: u32| semi(topology.edge_sharpness(edge));
+        let mut seen = vec![false; topology.vertex_count() as usize];
+        let mut lines = Vec::new();
+        for vertex in 0..topology.vertex_count() {
+            let mut edges = topology.vertex_edges(vertex).iter();
+            let is_on_one =
+                semi(topology.vertex_sharpness(vertex)) || edges.any(|&edge| is_semi_edge(edge));
+            if !is_on_one || seen[vertex as usize] {
+                continue;
+            }
+            seen[vertex as usize] = true;
+            let (mut line, mut next) = (vec![vertex], 0);
+            while let Some(&at) = line.get(next) {
+                next += 1;
+                for &edge in topology
+                    .vertex_edges(at)
+                    .iter()
+                    .filter(|&&edge| is_semi_edge(edge))
+                {
+                    let end = topology.edge_end(edge, at);
+                    if !std::mem::replace(&mut seen[end as usize], true) {
+                        line.push(end);
+                    }
+                }
+            }
+            lines.push(line);
         }
+        Self { lines }
+    }
+
+    /// True where there are none.
+    pub(super) fn is_empty(&self) -> bool {
+        self.lines.is_empty()
+    }
+
+    /// All vertices of all lines.
+    pub(super) fn vertices(&self) -> impl Iterator<Item = u32> + '_ {
+        self.lines.iter().flatten().copied()
+    }
+
+    /// All vertices of all lines, each with the greatest depth on its line.
+    pub(super) fn depths<'a>(&'a self, depths: &'a [u8]) -> impl Iterator<Item = (u32, u8)> + 'a {
+        self.lines.iter().flat_map(|line| {
+            let depth = line.iter().map(|&vertex| depths[vertex as usize]).max();
+            line.iter().map(move |&vertex| (vertex, depth.unwrap_or(0)))
+        })
     }
 }
 

@@ -18,6 +18,8 @@
     reason = "cages have fewer than 2^32 corners (checked by `Cage::new`), corners and sides fewer than five"
 )]
 
+mod blocks;
+mod cap;
 mod depth;
 mod evaluate;
 mod execute;
@@ -31,9 +33,11 @@ mod tables;
 mod testing;
 
 pub use crate::subdiv::Real;
+pub use blocks::{Blocks, CapEntry, Changes, Entry, Piece, Positions};
+pub use cap::{Cap, CapRing};
 pub use depth::{DepthRule, Feature, Features, MAX_RULE_DEPTH};
 pub use evaluate::Sample;
 pub use feature::{FeatureKind, features};
-pub use patch::{Cap, CapRing, Patch, Place, RenderTable};
+pub use patch::{Patch, Place, RenderTable};
 pub use rows::{BlendRow, LevelRows, PointCounts};
 pub use tables::{MAX_DEPTH, Tables};

@@ -1,5 +1,5 @@
-//! The render table: bicubic patches with their sixteen controls, caps around features that end, and which of their
-//! sides face finer patches.
+//! The render table: bicubic patches with their sixteen controls, [caps](Cap) around features that end, and which of
+//! their sides face finer patches.
 //!
 //! ```text
 //!   row 3   12 13 14 15      controls 5, 6, 10, 9 are the face's corners 0, 1, 2, 3;
@@ -9,6 +9,7 @@
 //! ```
 
 use super::{
+    cap::{Cap, child_rings, own_rings},
     mesh::{ABSENT, Mesh, next, previous},
     refine::Children,
     rows::LevelRows,
@@ -29,7 +30,8 @@ pub struct Place {
 }
 
 impl Place {
-    fn child(self, corner: u8) -> Self {
+    /// The quarter at a corner of the patch.
+    pub(super) fn child(self, corner: u8) -> Self {
         let [du, dv] = [[0, 0], [1, 0], [1, 1], [0, 1]][corner as usize];
         Self {
             face: self.face,
@@ -52,36 +54,6 @@ pub struct Patch {
     pub finer: u8,
     /// Sides on a boundary or an infinitely sharp edge.
     pub sharp: u8,
-}
-
-/// A face at an extraordinary feature that is not refined further: drawn by a bicubic Bézier patch through exact limit corners.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Cap {
-    /// Its place on the cage.
-    pub place: Place,
-    /// Sides that face finer patches.
-    pub finer: u8,
-    /// Sides on a boundary or an infinitely sharp edge.
-    pub sharp: u8,
-    /// What lies around each corner.
-    pub rings: [CapRing; 4],
-}
-
-/// A cap's corner: its vertex and the sector of faces it lies in, between sharp edges where there are any.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct CapRing {
-    /// The vertex.
-    pub vertex: u32,
-    /// Far ends of the sector's edges, counter-clockwise; as many as faces when it closes, one more otherwise.
-    pub ends: Vec<u32>,
-    /// Across corners of the sector's faces; face `i` lies between ends `i` and `i + 1`.
-    pub diagonals: Vec<u32>,
-    /// Which of the faces is the cap itself.
-    pub own: usize,
-    /// True when the sector is the whole ring.
-    pub closed: bool,
-    /// True when the vertex stays in place under subdivision.
-    pub corner: bool,
 }
 
 /// All patches of a table.
@@ -115,7 +87,10 @@ pub(super) fn add_patches(source: &Source<'_>, rows: &mut LevelRows, table: &mut
         let place = source.places[face];
         let (finer, sharp) = (finer_sides(source, face), sharp_sides(mesh, face));
         if mesh.is_extraordinary(face) {
-            let rings = [0, 1, 2, 3].map(|corner| cap_ring(mesh, face, corner));
+            let rings = match source.above {
+                None => own_rings(mesh, face),
+                Some((above, children)) => child_rings(above, children, mesh.parents[face]),
+            };
             table.caps.push(Cap {
                 place,
                 finer,
@@ -125,7 +100,17 @@ pub(super) fn add_patches(source: &Source<'_>, rows: &mut LevelRows, table: &mut
         } else {
             let mut grid = match source.above {
                 None => own_grid(mesh, face, sharp),
-                Some((above, children)) => child_grid(above, children, mesh, face, sharp),
+                Some((above, children)) => {
+                    let (parent, corner) = mesh.parents[face];
+                    let own = [0, 1, 2, 3].map(|corner| mesh.point(face, corner));
+                    child_grid(
+                        above,
+                        children,
+                        (parent as usize, corner as usize),
+                        own,
+                        sharp,
+                    )
+                }
             };
             fill_phantoms(&mut grid, sharp, rows);
             table.patches.push(Patch {
@@ -158,7 +143,7 @@ fn finer_sides(source: &Source<'_>, face: usize) -> u8 {
     (0..4).map(|side| u8::from(finer(side)) << side).sum()
 }
 
-fn sharp_sides(mesh: &Mesh, face: usize) -> u8 {
+pub(super) fn sharp_sides(mesh: &Mesh, face: usize) -> u8 {
     (0..4)
         .map(|side| u8::from(mesh.sharpness(face, side) == f32::INFINITY) << side)
         .sum()
@@ -177,7 +162,7 @@ fn put(grid: &mut [u32; 16], corner: usize, beyond: [u32; 3]) {
 }
 
 /// Controls from a level's own faces; [`NONE`] beyond sharp sides.
-fn own_grid(mesh: &Mesh, face: usize, sharp: u8) -> [u32; 16] {
+pub(super) fn own_grid(mesh: &Mesh, face: usize, sharp: u8) -> [u32; 16] {
     let mut grid = [NONE; 16];
     for corner in 0..4 {
         grid[CORNERS[corner].0] = mesh.point(face, corner);
@@ -199,19 +184,18 @@ fn own_grid(mesh: &Mesh, face: usize, sharp: u8) -> [u32; 16] {
     grid
 }
 
-/// Controls of a child from the points its parent's neighbourhood gave; [`NONE`] beyond sharp sides.
-fn child_grid(
+/// Controls of child `c` of face `f` from the points its parent's neighbourhood gave, its own corners `own`; [`NONE`]
+/// beyond sharp sides.
+pub(super) fn child_grid(
     above: &Mesh,
     children: &Children,
-    mesh: &Mesh,
-    child: usize,
+    (f, c): (usize, usize),
+    own: [u32; 4],
     sharp: u8,
 ) -> [u32; 16] {
-    let (parent, c) = mesh.parents[child];
-    let (f, c) = (parent as usize, c as usize);
     let mut grid = [NONE; 16];
     for corner in 0..4 {
-        grid[CORNERS[corner].0] = mesh.point(child, corner);
+        grid[CORNERS[corner].0] = own[corner];
     }
     let vertex = |corner: usize| children.vertex[above.corners[f][corner] as usize];
     let before = neighbour(
@@ -269,7 +253,7 @@ fn neighbour(mesh: &Mesh, face: usize, side: usize, sharp: u8) -> Option<(usize,
     (sharp >> side & 1 == 0 && across < ABSENT).then(|| split(across))
 }
 
-const fn split(side: u32) -> (usize, usize) {
+pub(super) const fn split(side: u32) -> (usize, usize) {
     (side as usize / 4, side as usize % 4)
 }
 
@@ -310,75 +294,4 @@ fn fill_phantoms(grid: &mut [u32; 16], sharp: u8, rows: &mut LevelRows) {
             );
         }
     }
-}
-
-/// The sector of faces around a cap's corner, between infinitely sharp edges.
-fn cap_ring(mesh: &Mesh, face: usize, corner: usize) -> CapRing {
-    let vertex = mesh.corners[face][corner];
-    let mut corners = Vec::new();
-    let closed = mesh.ring(vertex, &mut corners);
-    let own = corners
-        .iter()
-        .position(|&found| found as usize == face * 4 + corner)
-        .unwrap_or(0);
-    let side_sharp = |corner: u32| mesh.sharpness(corner as usize / 4, corner as usize % 4) >= 1.0;
-    let sharp_count =
-        corners.iter().filter(|&&corner| side_sharp(corner)).count() + usize::from(!closed);
-    let stays = mesh.vertex_sharpness(vertex) >= 1.0 || sharp_count > 2;
-    let (first, count) = sector(
-        &corners,
-        own,
-        closed && sharp_count < 2,
-        closed,
-        &side_sharp,
-    );
-    let whole = closed && sharp_count < 2;
-    let sector: Vec<_> = (0..count)
-        .map(|i| corners[(first + i) % corners.len()])
-        .collect();
-    let mut ends: Vec<_> = sector
-        .iter()
-        .map(|&at| mesh.point(at as usize / 4, next(at as usize % 4)))
-        .collect();
-    if let (false, Some(&last)) = (whole, sector.last()) {
-        ends.push(mesh.point(last as usize / 4, previous(last as usize % 4)));
-    }
-    CapRing {
-        vertex: mesh.first_point + vertex,
-        ends,
-        diagonals: sector
-            .iter()
-            .map(|&at| mesh.point(at as usize / 4, (at as usize + 2) % 4))
-            .collect(),
-        own: (own + corners.len() - first) % corners.len(),
-        closed: whole,
-        corner: stays,
-    }
-}
-
-/// First face and number of faces of the sector that holds face `own`: sharp sides end it.
-fn sector(
-    corners: &[u32],
-    own: usize,
-    whole: bool,
-    closed: bool,
-    side_sharp: &impl Fn(u32) -> bool,
-) -> (usize, usize) {
-    let n = corners.len();
-    if whole {
-        return (0, n);
-    }
-    let mut first = own;
-    while !side_sharp(corners[first]) && (closed || first > 0) {
-        first = (first + n - 1) % n;
-    }
-    let mut count = 1;
-    while count < n {
-        let following = (first + count) % n;
-        if side_sharp(corners[following]) || (!closed && following == 0) {
-            break;
-        }
-        count += 1;
-    }
-    (first, count)
 }

@@ -18,6 +18,7 @@ use crate::{
 };
 
 /// Points a level gives to the next: the child point of each face, side and vertex; [`NONE`] where there is none.
+#[derive(Clone, Debug, Default)]
 pub(super) struct Children {
     /// True for refined faces.
     pub(super) refined: Vec<bool>,
@@ -239,7 +240,12 @@ pub(super) fn child_mesh(mesh: &Mesh, children: &Children, rows: &LevelRows) -> 
 }
 
 /// Points of child `corner`: the parent's vertex point at the same corner, then counter-clockwise.
-fn child_corners(mesh: &Mesh, children: &Children, face: usize, corner: usize) -> [u32; 4] {
+pub(super) fn child_corners(
+    mesh: &Mesh,
+    children: &Children,
+    face: usize,
+    corner: usize,
+) -> [u32; 4] {
     let mut points = [0; 4];
     points[corner] = children.vertex[mesh.corners[face][corner] as usize];
     points[next(corner)] = children.side[face][corner];
@@ -347,7 +353,7 @@ fn child_features(mesh: &Mesh, children: &Children, child: &mut Mesh) {
 }
 
 /// True when a feature's vertex point is a feature with what its sharpness has become.
-fn is_still_feature(mesh: &Mesh, vertex: u32, ring: &mut Vec<u32>) -> bool {
+pub(super) fn is_still_feature(mesh: &Mesh, vertex: u32, ring: &mut Vec<u32>) -> bool {
     if mesh.feature[vertex as usize] == Mesh::REGULAR {
         return false;
     }

@@ -1,7 +1,7 @@
 //! Building the tables of a cage for given depths.
 
 use super::{
-    feature::{FeatureKind, features, level_semi_sharp_lines},
+    feature::{FeatureKind, SemiSharpLines, features},
     mesh::Mesh,
     patch::{Place, RenderTable, Source, add_patches, child_places},
     refine::{child_mesh, refine, refined_faces},
@@ -63,6 +63,11 @@ impl Tables {
         self.levels.iter().map(|level| level.counts().total()).sum()
     }
 
+    /// Points that are numbered from the first made on, phantoms included.
+    pub(super) fn made_point_count(&self) -> u32 {
+        self.point_count() - self.base.first_point
+    }
+
     /// Bytes of all tables.
     #[must_use]
     pub fn byte_count(&self) -> usize {
@@ -82,8 +87,12 @@ impl Tables {
 }
 
 fn build(topology: &Topology, depths: &[u8]) -> Tables {
-    let mut depths = depths.to_vec();
-    level_semi_sharp_lines(topology, &mut depths);
+    let lines = SemiSharpLines::of(topology);
+    let mut levelled = depths.to_vec();
+    for (vertex, depth) in lines.depths(depths) {
+        levelled[vertex as usize] = depth;
+    }
+    let mut depths = levelled;
     let kinds = features(topology);
     for (depth, kind) in depths.iter_mut().zip(&kinds) {
         if *kind == FeatureKind::Regular {
@@ -94,20 +103,26 @@ fn build(topology: &Topology, depths: &[u8]) -> Tables {
         .iter()
         .map(|kind| *kind == FeatureKind::Extraordinary)
         .collect();
-    let mut mesh = Mesh::of_cage(topology, depths, extraordinary);
-    let mut places: Vec<_> = (0..topology.face_count())
+    let mesh = Mesh::of_cage(topology, depths, extraordinary);
+    grow(mesh, topology.vertex_count(), 0)
+}
+
+/// Tables of a whole cage with the depths its mesh names: points made are numbered from `first_point` on, patches of
+/// levels before `first_level` are left out.
+pub(super) fn grow(mut mesh: Mesh, first_point: u32, first_level: u8) -> Tables {
+    let mut places: Vec<_> = (0..mesh.face_count() as u32)
         .map(|face| Place {
             face,
             ..Place::default()
         })
         .collect();
     let mut rows = LevelRows {
-        first_point: topology.vertex_count(),
+        first_point,
         vertex_offsets: vec![0],
         ..LevelRows::default()
     };
     let mut tables = Tables {
-        cage_points: topology.vertex_count(),
+        cage_points: mesh.start.len() as u32,
         ..Tables::default()
     };
     let mut above = None;
@@ -119,7 +134,9 @@ fn build(topology: &Topology, depths: &[u8]) -> Tables {
             refined: refined.as_deref(),
             places: &places,
         };
-        add_patches(&source, &mut rows, &mut tables.render);
+        if level >= first_level {
+            add_patches(&source, &mut rows, &mut tables.render);
+        }
         let next = refined.map(|refined| refine(&mesh, refined, rows.end_point()));
         if level == 0 {
             tables.base = rows;
