@@ -9,6 +9,7 @@
 use super::{
     Cap, CapRing, Patch, Place,
     execute::{Real, add, scale},
+    stencil::{corner_at, gather},
 };
 use crate::subdiv::{basis, basis_derivative};
 
@@ -69,9 +70,12 @@ impl Cap {
         controls
     }
 
-    /// The cap's surface at (u, v).
+    /// The cap's surface at (u, v); at its corners the limit with its tangents.
     #[must_use]
     pub fn evaluate<T: Real>(&self, points: &[[T; 3]], uv: [f64; 2]) -> Sample<T> {
+        if let Some(corner) = corner_at(uv) {
+            return gather(&self.corner_stencil(corner), points);
+        }
         tensor(
             &self.controls(points),
             uv.map(bernstein),
@@ -81,7 +85,7 @@ impl Cap {
 }
 
 impl CapRing {
-    fn end(&self, index: usize) -> u32 {
+    pub(super) fn end(&self, index: usize) -> u32 {
         self.ends[index % self.ends.len()]
     }
 

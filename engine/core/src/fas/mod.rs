@@ -26,6 +26,7 @@ mod mesh;
 mod patch;
 mod refine;
 mod rows;
+mod stencil;
 mod tables;
 #[cfg(test)]
 mod testing;
@@ -36,4 +37,5 @@ pub use execute::Real;
 pub use feature::{FeatureKind, features};
 pub use patch::{Cap, CapRing, Patch, Place, RenderTable};
 pub use rows::{BlendRow, LevelRows, PointCounts};
+pub use stencil::{Piece, StencilTerm};
 pub use tables::{MAX_DEPTH, Tables};
