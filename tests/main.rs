@@ -6,6 +6,7 @@ mod features;
 mod flight;
 mod gpu_parity;
 mod layers;
+mod refine;
 mod shared_structs;
 mod support;
 mod terrain;

@@ -215,10 +215,8 @@ mod tests {
             let points = tables.execute(cage.positions());
             for cap in &tables.render.caps {
                 for uv in [[0.0, 0.0], [1.0, 0.0], [0.5, 1.0], [0.25, 0.75], [1.0, 1.0]] {
-                    let (found, wanted) = (
-                        gather(&cap.stencil(uv), &points),
-                        cap.evaluate(&points, uv),
-                    );
+                    let (found, wanted) =
+                        (gather(&cap.stencil(uv), &points), cap.evaluate(&points, uv));
                     for axis in 0..3 {
                         let close = |a: [f64; 3], b: [f64; 3]| {
                             (a[axis] - b[axis]).abs() <= 1e-12 * cage.extent()
