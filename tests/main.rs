@@ -7,6 +7,7 @@ mod flight;
 mod gpu_parity;
 mod imagery;
 mod layers;
+mod refine;
 mod shared_structs;
 mod support;
 mod terrain;

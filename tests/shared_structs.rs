@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 
 use drumlin_core::{
     geo,
-    reference::shared::{self, DrawnTile, FeatureVertex, Frame, UploadHeader, border, patch_word},
+    reference::shared::{
+        self, DrawnTile, FeatureVertex, Frame, UploadHeader, border, patch_word, refine,
+        refine::{RefineHeader, RefineTask},
+    },
 };
 use naga::{Expression, Literal, Module, TypeInner};
 
@@ -65,13 +68,17 @@ fn structs_have_one_layout_on_both_sides() {
         color_slot, color_scale, color_offset, skirt, geometric_error, corner_tile, corner_sample, side_north,
         side_east, side_south, side_west);
     let upload = fields!(UploadHeader: slot, quantum, unit, reserved, step, reserved_2);
-    let vertex = fields!(FeatureVertex: position, tile, normal, reserved);
+    let vertex = fields!(FeatureVertex: position, tile, normal, position_of);
+    let header = fields!(RefineHeader: step, size, first, tiles, patches_word, vertices_word, vertex_count, reserved);
+    let task = fields!(RefineTask: kind, count, rows_word, first_point);
     let modules = modules();
     for (name, rust) in [
         ("Frame", frame),
         ("DrawnTile", tile),
         ("UploadHeader", upload),
         ("FeatureVertex", vertex),
+        ("RefineHeader", header),
+        ("RefineTask", task),
     ] {
         let found: Vec<_> = modules
             .iter()
@@ -113,6 +120,7 @@ fn constants_are_equal_on_both_sides() {
         border: TILE_QUADS, QUAD_SAMPLES, TILE_CELLS, TILE_SAMPLES, PATCH_COUNT, EDGE_NORTH, EDGE_EAST, EDGE_SOUTH,
             EDGE_WEST, SIDE_NONE;
         patch_word: SHIFT_COUNT, FINEST_DEPTH, DEPTH_CUT, PATCH_CUT;
+        refine: REFINE_MEANS, REFINE_RINGS, REFINE_WEIGHTED, REFINE_WEIGHTED_WORDS, REFINE_VERTEX_WORDS, REFINE_STENCIL;
         shared: NONE, SAMPLE_BITS, SKIRT_FIRST, HEIGHTS_WORD, SLOPES_WORD, VOIDS_WORD, STRIDE_ERRORS_WORD, CODES_WORD,
             CONTROLS_WORD, CUT_WORD, SLOT_WORDS, SLOTS_PER_PAGE, FLAG_DRAW_VOIDS, FLAG_DEPTH_COLORS, FLAG_SRGB_OUT,
             FLAG_WIREFRAME, TILE_VISIBLE, TILE_VOIDS, TILE_CUT, FEATURE_BORDER, SIDE_INDEX_MASK, SIDE_SAME, SIDE_COARSER, SIDE_FINER,

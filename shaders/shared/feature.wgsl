@@ -5,7 +5,7 @@ struct FeatureVertex {
     position: vec3f,                // metres from the feature's origin
     tile: u32,                      // the feature's tile under it: its place in the feature's list
     normal: vec3f,                  // outward, unit length
-    reserved: u32,
+    position_of: u32,               // the vertex whose position it has; itself unless it only shades differently
 }
 
 struct FeaturePlace {

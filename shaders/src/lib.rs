@@ -9,7 +9,7 @@ mod sources;
 pub use sources::{SHARED, SOURCES};
 
 /// The stages in the order in which they run.
-pub const STAGES: &[&str] = &["decode", "depth", "balance", "emit", "draw"];
+pub const STAGES: &[&str] = &["decode", "refine", "depth", "balance", "emit", "draw"];
 
 /// The whole text of a stage; none when there is no such stage, or when it imports what does not exist.
 ///

@@ -3,6 +3,7 @@
 /// A stage's name and its text with `#import` lines as they stand.
 pub const SOURCES: &[(&str, &str)] = &[
     ("decode", include_str!("../stages/decode.wgsl")),
+    ("refine", include_str!("../stages/refine.wgsl")),
     ("depth", include_str!("../stages/depth.wgsl")),
     ("balance", include_str!("../stages/balance.wgsl")),
     ("emit", include_str!("../stages/emit.wgsl")),
@@ -21,5 +22,6 @@ pub const SHARED: &[(&str, &str)] = &[
     ("patch_word", include_str!("../shared/patch_word.wgsl")),
     ("draw_list", include_str!("../shared/draw_list.wgsl")),
     ("feature", include_str!("../shared/feature.wgsl")),
+    ("refine", include_str!("../shared/refine.wgsl")),
     ("upload", include_str!("../shared/upload.wgsl")),
 ];

@@ -92,7 +92,7 @@ fn feature_vertex(@builtin(vertex_index) index: u32) -> FeaturePoint {
         normal = normalize(vec3f(-ground_slope(tile, vec2f(place.yx)), 1.0));
     } else {
         tile = feature_place.tiles[feature_vertices[index].tile];
-        position = feature_place.origin + feature_vertices[index].position;
+        position = feature_place.origin + feature_vertices[feature_vertices[index].position_of].position;
         normal = feature_vertices[index].normal;
     }
     let clip = clip_position(position);

@@ -1,10 +1,13 @@
-//! Meshes of features on the device: two buffers a feature, and where this frame draws it.
+//! Meshes of features on the device: vertices and indices of each, and where this frame draws it.
 //!
-//! Which meshes are up is the planner's to say, within its budget; a mesh is put up in place of the one before.
+//! Which meshes are up is the planner's to say, within its budget; a mesh is put up in place of the one before. What goes
+//! up are tables; the stage `refine` makes them vertices within the same submission, and the tables go with the next.
 
 use std::collections::BTreeMap;
 
 use drumlin_core::terrain::{FeatureDraw, FeatureUpload, FramePlan};
+
+use crate::stages::{Refine, RefineBuffers};
 
 /// Bytes of a feature's place before its tiles; its whole is a multiple of them.
 const PLACE_BYTES: u64 = 16;
@@ -26,6 +29,8 @@ pub(crate) struct FeaturePool {
     layout: wgpu::BindGroupLayout,
     meshes: BTreeMap<u32, FeatureBuffers>,
     drawn: Vec<u32>,
+    /// Tables that this frame executes.
+    arrived: Vec<RefineBuffers>,
 }
 
 impl FeaturePool {
@@ -35,17 +40,27 @@ impl FeaturePool {
             layout,
             meshes: BTreeMap::new(),
             drawn: Vec::new(),
+            arrived: Vec::new(),
         }
     }
 
-    /// Puts meshes up, drops those no longer needed, and writes where features are.
-    pub(crate) fn write(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, plan: &FramePlan) {
+    /// Puts tables up, drops meshes no longer needed, and writes where features are.
+    pub(crate) fn write(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        refine: &Refine,
+        plan: &FramePlan,
+    ) {
+        self.arrived.clear();
         for feature in &plan.feature_frees {
             self.meshes.remove(feature);
         }
         for upload in &plan.feature_uploads {
-            self.meshes
-                .insert(upload.feature, buffers(device, queue, upload));
+            let refined = refine.upload(device, queue, &upload.tables);
+            let mesh = buffers(device, queue, upload, refined.vertices.clone());
+            self.meshes.insert(upload.feature, mesh);
+            self.arrived.push(refined);
         }
         self.drawn.clear();
         for draw in &plan.features {
@@ -54,6 +69,11 @@ impl FeaturePool {
                 self.drawn.push(draw.feature);
             }
         }
+    }
+
+    /// Tables to be executed in this frame, before anything is drawn.
+    pub(crate) fn arrived(&self) -> &[RefineBuffers] {
+        &self.arrived
     }
 
     /// The features of this frame.
@@ -70,7 +90,10 @@ impl FeaturePool {
                 + mesh.indices.size()
                 + mesh.place.as_ref().map_or(0, wgpu::Buffer::size)
         };
-        self.meshes.values().map(bytes).sum()
+        // Vertices of tables on their way are counted with their meshes.
+        let under_way = |tables: &RefineBuffers| tables.byte_count() - tables.vertices.size();
+        self.meshes.values().map(bytes).sum::<u64>()
+            + self.arrived.iter().map(under_way).sum::<u64>()
     }
 }
 
@@ -114,17 +137,22 @@ fn bind(
     })
 }
 
-fn buffers(device: &wgpu::Device, queue: &wgpu::Queue, upload: &FeatureUpload) -> FeatureBuffers {
-    let vertices = bytemuck::cast_slice(&upload.vertices);
-    let indices = bytemuck::cast_slice(&upload.indices);
-    let filled = |bytes: &[u8], usage| {
-        let filled = buffer(device, (bytes.len() as u64).max(32), usage);
-        queue.write_buffer(&filled, 0, bytes);
-        filled
-    };
+fn buffers(
+    device: &wgpu::Device,
+    queue: &wgpu::Queue,
+    upload: &FeatureUpload,
+    vertices: wgpu::Buffer,
+) -> FeatureBuffers {
+    let bytes: &[u8] = bytemuck::cast_slice(&upload.indices);
+    let indices = buffer(
+        device,
+        (bytes.len() as u64).max(4),
+        wgpu::BufferUsages::INDEX,
+    );
+    queue.write_buffer(&indices, 0, bytes);
     FeatureBuffers {
-        vertices: filled(vertices, wgpu::BufferUsages::STORAGE),
-        indices: filled(indices, wgpu::BufferUsages::INDEX),
+        vertices,
+        indices,
         index_count: u32::try_from(upload.indices.len()).unwrap_or(0),
         place: None,
         bindings: None,

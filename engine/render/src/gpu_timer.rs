@@ -1,13 +1,16 @@
 //! GPU times from timestamp queries, where the device has them; read frames later, never waited for.
 //!
-//! Two spans a frame: the stages (one compute pass) and the caller's render pass, if the caller
-//! puts `pass_writes` into it. A span that was not written is not resolved.
+//! Three spans a frame: the stages (one compute pass), `refine` (another, in frames in which tables of features arrive),
+//! and the caller's render pass, if the caller puts `pass_writes` into it. A span that was not written is not resolved.
 
 use crate::readback::Readback;
 
 const STAGES: u32 = 0;
-const PASS: u32 = 2;
-const QUERIES: u32 = 4;
+const REFINE: u32 = 2;
+const PASS: u32 = 4;
+const QUERIES: u32 = 6;
+/// Where a span is resolved to: a multiple of what WebGPU asks for.
+const RESOLVED_STRIDE: u64 = 256;
 const BYTES: u64 = QUERIES as u64 * 8;
 
 /// GPU times of one frame.
@@ -17,6 +20,8 @@ pub struct GpuTimes {
     pub frame: u64,
     /// From decoding the uploads to writing the last index, milliseconds.
     pub stages_millis: f64,
+    /// Executing the tables of features that arrived, milliseconds; where there were any.
+    pub refine_millis: Option<f64>,
     /// The render pass the terrain was drawn in, milliseconds; where the caller timed it.
     pub pass_millis: Option<f64>,
 }
@@ -28,6 +33,7 @@ pub(crate) struct GpuTimer {
     readback: Readback,
     period: f64,
     written: Option<u64>,
+    refine_written: bool,
     pass_written: bool,
     latest: Option<GpuTimes>,
 }
@@ -45,7 +51,7 @@ impl GpuTimer {
         });
         let resolved = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("drumlin times"),
-            size: 512,
+            size: 3 * RESOLVED_STRIDE,
             usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });
@@ -55,6 +61,7 @@ impl GpuTimer {
             readback: Readback::new(device, "drumlin times", BYTES),
             period: f64::from(queue.get_timestamp_period()) * 1e-6,
             written: None,
+            refine_written: false,
             pass_written: false,
             latest: None,
         })
@@ -66,12 +73,19 @@ impl GpuTimer {
         let Some(frame) = self.written.take() else {
             return;
         };
-        let timed = std::mem::take(&mut self.pass_written);
-        let count = if timed { QUERIES } else { PASS };
-        if let Some(buffer) = self.readback.record(encoder, frame) {
-            encoder.clear_buffer(buffer, 0, None);
-            encoder.resolve_query_set(&self.queries, STAGES..count, &self.resolved, 0);
-            encoder.copy_buffer_to_buffer(&self.resolved, 0, buffer, 0, u64::from(count) * 8);
+        let spans = [
+            (STAGES, true),
+            (REFINE, std::mem::take(&mut self.refine_written)),
+            (PASS, std::mem::take(&mut self.pass_written)),
+        ];
+        let Some(buffer) = self.readback.record(encoder, frame) else {
+            return;
+        };
+        encoder.clear_buffer(buffer, 0, None);
+        for (first, _) in spans.into_iter().filter(|span| span.1) {
+            let place = u64::from(first / 2) * RESOLVED_STRIDE;
+            encoder.resolve_query_set(&self.queries, first..first + 2, &self.resolved, place);
+            encoder.copy_buffer_to_buffer(&self.resolved, place, buffer, u64::from(first) * 8, 16);
         }
     }
 
@@ -81,6 +95,16 @@ impl GpuTimer {
             query_set: &self.queries,
             beginning_of_pass_write_index: Some(STAGES),
             end_of_pass_write_index: Some(STAGES + 1),
+        }
+    }
+
+    /// What the compute pass of `refine` writes.
+    pub(crate) fn refine_writes(&mut self) -> wgpu::ComputePassTimestampWrites<'_> {
+        self.refine_written = true;
+        wgpu::ComputePassTimestampWrites {
+            query_set: &self.queries,
+            beginning_of_pass_write_index: Some(REFINE),
+            end_of_pass_write_index: Some(REFINE + 1),
         }
     }
 
@@ -135,6 +159,7 @@ fn times(frame: u64, bytes: &[u8], period: f64) -> GpuTimes {
     GpuTimes {
         frame,
         stages_millis: span(STAGES).unwrap_or(0.0),
+        refine_millis: span(REFINE),
         pass_millis: span(PASS),
     }
 }
@@ -146,7 +171,7 @@ mod tests {
     #[test]
     fn a_pass_that_was_not_timed_has_no_time() {
         let mut bytes = Vec::new();
-        for tick in [1_000_000_u64, 3_000_000, 0, 0] {
+        for tick in [1_000_000_u64, 3_000_000, 4_000_000, 4_500_000, 0, 0] {
             bytes.extend_from_slice(&tick.to_le_bytes());
         }
         let times = times(7, &bytes, 1e-6);
@@ -155,6 +180,7 @@ mod tests {
             GpuTimes {
                 frame: 7,
                 stages_millis: 2.0,
+                refine_millis: Some(0.5),
                 pass_millis: None
             }
         );

@@ -71,6 +71,6 @@ pub use limits::check_limits;
 pub use look::Look;
 pub use offscreen::Offscreen;
 pub use renderer::{Renderer, RendererBuffers, RendererDescriptor};
-pub use stages::TargetFormats;
+pub use stages::{Refine, RefineBuffers, TargetFormats};
 pub use terrain::{FrameReport, Pace, Terrain, TerrainDescriptor, TerrainSource};
 pub use wgpu;

@@ -21,6 +21,7 @@ use crate::{
         draw::{Draw, DrawBindings},
         emit::Emit,
         group,
+        refine::Refine,
     },
     staging::Staging,
     vram::UPLOADS_AT_ONCE,
@@ -57,6 +58,7 @@ pub struct Renderer {
 struct Stages {
     shared: SharedLayouts,
     decode: Decode,
+    refine: Refine,
     depth: Depth,
     balance: Balance,
     emit: Emit,
@@ -145,11 +147,13 @@ impl Renderer {
         for upload in &plan.color_uploads {
             self.imagery.upload(queue, upload);
         }
-        self.features.write(device, queue, plan);
+        self.features
+            .write(device, queue, &self.stages.refine, plan);
         if let Some(frame) = &plan.frame {
             self.view.write(queue, &plan.drawn, frame, self.srgb_out);
         }
         encoder.clear_buffer(&self.view.draw_list, 0, None);
+        self.refine(encoder);
         self.encode_stages(queue, encoder, uploads, plan.frame.is_some());
         self.view.record_counts(encoder, self.frame);
         self.is_drawable = true;
@@ -276,6 +280,20 @@ impl Renderer {
         }
     }
 
+    /// Executes the tables of features that arrived.
+    fn refine(&mut self, encoder: &mut wgpu::CommandEncoder) {
+        if self.features.arrived().is_empty() {
+            return;
+        }
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("drumlin refine"),
+            timestamp_writes: self.timer.as_mut().map(GpuTimer::refine_writes),
+        });
+        for tables in self.features.arrived() {
+            self.stages.refine.dispatch(&mut pass, tables);
+        }
+    }
+
     fn encode_stages(
         &mut self,
         queue: &wgpu::Queue,
@@ -344,6 +362,7 @@ impl Stages {
         let shared = SharedLayouts::new(device);
         Self {
             decode: Decode::new(device),
+            refine: Refine::new(device),
             depth: Depth::new(device, &shared),
             balance: Balance::new(device, &shared),
             emit: Emit::new(device, &shared),

@@ -228,7 +228,10 @@ impl<'a> Flight<'a> {
             row.patches.transition = counts.transition_patches.map(u64::from);
         }
         if let Some((times, row)) = times.and_then(|times| Some((times, self.row(times.frame)?))) {
-            row.gpu_millis = Some(times.stages_millis + times.pass_millis.unwrap_or(0.0));
+            let passes = [times.refine_millis, times.pass_millis];
+            let passes: f64 = passes.into_iter().flatten().sum();
+            row.gpu_millis = Some(times.stages_millis + passes);
+            row.gpu_refine_millis = times.refine_millis;
         }
     }
 

@@ -38,6 +38,8 @@ pub(crate) struct FrameRow {
     pub(crate) cpu_total_millis: f64,
     /// Null where the adapter has no timestamps.
     pub(crate) gpu_millis: Option<f64>,
+    /// The part of it in which tables of features are executed; null where none arrived.
+    pub(crate) gpu_refine_millis: Option<f64>,
     pub(crate) tiles_drawn: u64,
     pub(crate) patches: PatchCounts,
     pub(crate) triangles: u64,
@@ -116,6 +118,7 @@ impl Report {
             ("cpu_encode_millis", "CPU encode, ms"),
             ("cpu_total_millis", "CPU total, ms"),
             ("gpu_millis", "GPU, ms"),
+            ("gpu_refine_millis", "GPU refine, ms"),
             ("tiles_drawn", "tiles drawn"),
             ("triangles", "triangles"),
             ("tiles_missing", "tiles missing"),

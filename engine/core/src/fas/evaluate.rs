@@ -9,6 +9,7 @@
 use super::{
     Cap, CapRing, Patch, Place,
     execute::{add, scale},
+    stencil::{corner_at, gather},
 };
 use crate::subdiv::{Real, basis, basis_derivative};
 
@@ -74,9 +75,12 @@ impl Cap {
         controls
     }
 
-    /// The cap's surface at (u, v).
+    /// The cap's surface at (u, v); at its corners the limit with its tangents.
     #[must_use]
     pub fn evaluate<T: Real>(&self, points: &[[T; 3]], uv: [f64; 2]) -> Sample<T> {
+        if let Some(corner) = corner_at(uv) {
+            return gather(&self.corner_stencil(corner), points);
+        }
         tensor(
             &self.controls(points),
             uv.map(bernstein),
@@ -86,7 +90,7 @@ impl Cap {
 }
 
 impl CapRing {
-    fn end(&self, index: usize) -> u32 {
+    pub(super) fn end(&self, index: usize) -> u32 {
         self.ends[index % self.ends.len()]
     }
 

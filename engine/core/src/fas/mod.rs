@@ -28,6 +28,7 @@ mod mesh;
 mod patch;
 mod refine;
 mod rows;
+mod stencil;
 mod tables;
 #[cfg(test)]
 mod testing;
@@ -40,4 +41,5 @@ pub use evaluate::Sample;
 pub use feature::{FeatureKind, features};
 pub use patch::{Patch, Place, RenderTable};
 pub use rows::{BlendRow, LevelRows, PointCounts};
+pub use stencil::{Piece, StencilTerm};
 pub use tables::{MAX_DEPTH, Tables};

@@ -56,7 +56,8 @@ pub fn feature_position(
     index: u32,
 ) -> Vec3 {
     if index & FEATURE_BORDER == 0 {
-        let position = Vec3::from(feature.vertices[index as usize].position);
+        let placed = feature.vertices[index as usize].position_of;
+        let position = Vec3::from(feature.vertices[placed as usize].position);
         return Vec3::from(feature.origin) + position;
     }
     let at = index ^ FEATURE_BORDER;

@@ -5,4 +5,5 @@ pub mod decode;
 pub mod depth;
 pub mod draw;
 pub mod emit;
+pub mod refine;
 pub mod shared;

@@ -9,6 +9,7 @@ pub mod colors;
 pub mod ground;
 pub mod patch_word;
 pub mod pool;
+pub mod refine;
 pub mod synthetic;
 
 /// No tile, no slot, no fixed depth.
@@ -211,6 +212,6 @@ pub struct FeatureVertex {
     pub tile: u32,
     /// Outward, unit length.
     pub normal: [f32; 3],
-    /// 0.
-    pub reserved: u32,
+    /// The vertex whose position this one has; itself unless it only shades differently.
+    pub position_of: u32,
 }

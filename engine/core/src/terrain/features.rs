@@ -94,9 +94,9 @@ impl FeaturePool {
     pub(super) fn byte_counts(&self) -> [u64; 2] {
         let (mut vram, mut ram) = (0, 0);
         for group in self.groups.values() {
-            let mesh = group.mesh.as_ref().map_or(0, ReadyMesh::byte_count);
-            vram += if group.is_up { mesh } else { 0 };
-            ram += mesh + group.shape.as_ref().map_or(0, |shape| shape.byte_count());
+            let mesh = group.mesh.as_ref().map_or([0; 2], ReadyMesh::byte_counts);
+            vram += if group.is_up { mesh[0] } else { 0 };
+            ram += mesh[1] + group.shape.as_ref().map_or(0, |shape| shape.byte_count());
         }
         [vram, ram]
     }
@@ -203,8 +203,8 @@ impl FeaturePool {
             let mesh = group.mesh.take();
             let freed = std::mem::take(&mut group.is_up);
             let [vram, ram] = self.wanted_bytes();
-            let mesh_bytes = mesh.as_ref().map_or(0, ReadyMesh::byte_count);
-            if vram + mesh_bytes <= self.vram_budget && ram + mesh_bytes <= self.ram_budget {
+            let own = mesh.as_ref().map_or([0; 2], ReadyMesh::byte_counts);
+            if vram + own[0] <= self.vram_budget && ram + own[1] <= self.ram_budget {
                 if let Some(group) = self.groups.get_mut(&id) {
                     (group.mesh, group.is_up) = (mesh, freed);
                 }
@@ -225,7 +225,7 @@ impl FeaturePool {
     fn wanted_bytes(&self) -> [u64; 2] {
         let meshes = self.groups.values().filter_map(|group| group.mesh.as_ref());
         [
-            meshes.map(ReadyMesh::byte_count).sum(),
+            meshes.map(|mesh| mesh.byte_counts()[0]).sum(),
             self.byte_counts()[1],
         ]
     }
@@ -239,7 +239,7 @@ impl FeaturePool {
             if let Some(mesh) = &group.mesh {
                 plan.feature_uploads.push(FeatureUpload {
                     feature: *id,
-                    vertices: Arc::clone(&mesh.vertices),
+                    tables: Arc::clone(&mesh.tables),
                     indices: Arc::clone(&mesh.indices),
                 });
                 (group.is_up, group.is_new) = (true, false);

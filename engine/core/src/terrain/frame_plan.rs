@@ -6,7 +6,7 @@ use super::frame::point;
 use crate::{
     geo::TileId,
     pyramid::Tile,
-    reference::shared::{DrawnTile, FeatureVertex, Frame, TILE_VISIBLE},
+    reference::shared::{DrawnTile, Frame, TILE_VISIBLE, refine::RefineTables},
     stream::{Bounds, View},
 };
 
@@ -28,8 +28,8 @@ pub struct Upload {
 pub struct FeatureUpload {
     /// Which feature.
     pub feature: u32,
-    /// Its vertices.
-    pub vertices: Arc<[FeatureVertex]>,
+    /// What its vertices are made from.
+    pub tables: Arc<RefineTables>,
     /// Three a triangle: vertices, or samples of its tiles on the border of its cut; see
     /// [`FEATURE_BORDER`](crate::reference::shared::FEATURE_BORDER).
     pub indices: Arc<[u32]>,

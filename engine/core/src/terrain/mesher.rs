@@ -17,7 +17,7 @@ use crate::{
     cage::Cage,
     geo::{TILE_SAMPLES, TileId},
     pyramid::{PyramidError, Tile, feature::FeatureGroup, surface},
-    reference::shared::{FeatureVertex, border::TILE_CELLS},
+    reference::shared::{border::TILE_CELLS, refine::RefineTables},
 };
 
 /// What a shape is made from: the group, its cage, and its tiles in the group's order.
@@ -48,17 +48,22 @@ pub(super) struct MeshJob {
     pub(super) depths: Arc<[u8]>,
 }
 
+/// Bytes of a buffer that WebGPU's default limits let a stage bind.
+const BUFFER_BYTES: u64 = 128 << 20;
+
 /// A mesh as the GPU gets it.
 #[derive(Clone, Debug)]
 pub(super) struct ReadyMesh {
-    pub(super) vertices: Arc<[FeatureVertex]>,
+    pub(super) tables: Arc<RefineTables>,
     pub(super) indices: Arc<[u32]>,
     pub(super) depths: Arc<[u8]>,
 }
 
 impl ReadyMesh {
-    pub(super) fn byte_count(&self) -> u64 {
-        (size_of_val(&*self.vertices) + size_of_val(&*self.indices)) as u64
+    /// Bytes on the device, while its tables are executed, and in RAM.
+    pub(super) fn byte_counts(&self) -> [u64; 2] {
+        let indices = size_of_val(&*self.indices) as u64;
+        [self.tables.device_bytes(), self.tables.byte_count()].map(|bytes| bytes + indices)
     }
 }
 
@@ -159,10 +164,17 @@ fn mesh(job: &MeshJob) -> Result<Meshed, String> {
     let mesh = if depths[..] == job.depths[..] {
         None
     } else {
-        let mesh = shape.mesh(&depths).map_err(|error| error.to_string())?;
+        let table = shape.table(&depths).map_err(|error| error.to_string())?;
+        let (tables, indices) = table.packed(&shape);
+        let largest = tables.largest_buffer_bytes();
+        if largest > BUFFER_BYTES {
+            return Err(format!(
+                "its tables need a buffer of {largest} bytes, above the limit of {BUFFER_BYTES}"
+            ));
+        }
         Some(ReadyMesh {
-            vertices: mesh.vertices().into(),
-            indices: mesh.draw_indices().into(),
+            tables: tables.into(),
+            indices: indices.into(),
             depths: depths.into(),
         })
     };

@@ -8,8 +8,10 @@ pub(crate) mod decode;
 pub(crate) mod depth;
 pub(crate) mod draw;
 pub(crate) mod emit;
+pub(crate) mod refine;
 
 pub use draw::TargetFormats;
+pub use refine::{Refine, RefineBuffers};
 
 use crate::pool::PAGE_COUNT;
 

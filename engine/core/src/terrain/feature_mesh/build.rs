@@ -14,10 +14,10 @@
 
 use std::collections::HashMap;
 
-use super::{FeatureMesh, FeatureShape};
+use super::{FeatureShape, FeatureTable};
 use crate::{
-    fas::{Cap, Patch, Place, Sample, Tables},
-    reference::shared::{NONE, SAMPLE_BITS, border::TILE_SAMPLES},
+    fas::{Piece, Place, Tables},
+    reference::shared::{NONE, refine::RefineSite},
 };
 
 /// A face's side in the fixed steps that places are counted in: finer than any cell of the greatest depth.
@@ -38,53 +38,42 @@ enum On {
     Face(u32, u32, u32),
 }
 
-enum Piece<'a> {
-    Patch(&'a Patch),
-    Cap(&'a Cap),
-}
-
-impl Piece<'_> {
-    fn evaluate(&self, points: &[[f64; 3]], uv: [f64; 2]) -> Sample<f64> {
-        match self {
-            Self::Patch(patch) => patch.evaluate(points, uv),
-            Self::Cap(cap) => cap.evaluate(points, uv),
-        }
-    }
-}
-
 struct Builder<'a> {
     shape: &'a FeatureShape,
-    points: Vec<[f64; 3]>,
     vertices: HashMap<Key, u32>,
     /// Vertices of sharp places by what they lie on: their positions are one.
     sharp: HashMap<On, u32>,
-    mesh: FeatureMesh,
+    sites: Vec<RefineSite>,
+    samples: Vec<Option<[u32; 2]>>,
+    indices: Vec<u32>,
 }
 
-/// The mesh of tables.
-pub(super) fn mesh(shape: &FeatureShape, tables: &Tables) -> FeatureMesh {
+/// Vertices and triangles of tables.
+pub(super) fn table(shape: &FeatureShape, tables: Tables) -> FeatureTable {
     let mut builder = Builder {
         shape,
-        points: tables.execute(shape.cage.positions()),
         vertices: HashMap::new(),
         sharp: HashMap::new(),
-        mesh: FeatureMesh {
-            origin: shape.origin,
-            ..FeatureMesh::default()
-        },
+        sites: Vec::new(),
+        samples: Vec::new(),
+        indices: Vec::new(),
     };
-    for patch in &tables.render.patches {
-        builder.piece(&Piece::Patch(patch), patch.place, patch.finer);
+    for (patch, at) in tables.render.patches.iter().zip(0..) {
+        builder.piece(Piece::Patch(at), patch.place, patch.finer);
     }
-    for cap in &tables.render.caps {
-        builder.piece(&Piece::Cap(cap), cap.place, cap.finer);
+    for (cap, at) in tables.render.caps.iter().zip(0..) {
+        builder.piece(Piece::Cap(at), cap.place, cap.finer);
     }
-    mend_normals(&mut builder.mesh);
-    builder.mesh
+    FeatureTable {
+        sites: builder.sites,
+        samples: builder.samples,
+        indices: builder.indices,
+        tables,
+    }
 }
 
 impl Builder<'_> {
-    fn piece(&mut self, piece: &Piece<'_>, place: Place, finer: u8) {
+    fn piece(&mut self, piece: Piece, place: Place, finer: u8) {
         let count = (2_u32 >> place.level).max(1);
         let side = ONE >> place.level;
         let step = side / count;
@@ -114,24 +103,37 @@ impl Builder<'_> {
                 triangles.extend([centre, a, middle, centre, middle, b]);
             }
         }
-        self.mesh.indices.extend(triangles);
+        self.indices.extend(triangles);
     }
 
     /// The vertex at steps (u, v) of a face, made when it is not there yet.
-    fn vertex(&mut self, piece: &Piece<'_>, place: Place, at: [u32; 2]) -> u32 {
+    fn vertex(&mut self, piece: Piece, place: Place, at: [u32; 2]) -> u32 {
         let (on, is_sharp) = self.on(place.face, at);
         let face = if is_sharp { place.face } else { NONE };
         let key = Key { on, face };
         if let Some(&vertex) = self.vertices.get(&key) {
             return vertex;
         }
-        let vertex = self.make(piece, place, at, on);
+        let vertex = u32::try_from(self.sites.len()).unwrap_or(NONE);
         self.vertices.insert(key, vertex);
-        if is_sharp {
-            // The same place on another face: its normal is that face's, its position the first's to the bit.
-            let first = *self.sharp.entry(on).or_insert(vertex);
-            self.mesh.positions[vertex as usize] = self.mesh.positions[first as usize];
-        }
+        // The same place on another face: its normal is that face's, its position the first's to the bit.
+        let position_of = if is_sharp {
+            *self.sharp.entry(on).or_insert(vertex)
+        } else {
+            vertex
+        };
+        let side = ONE >> place.level;
+        let first = [place.u, place.v].map(|at| u32::from(at) * side);
+        let share = |steps: u32, whole: u32| f64::from(steps) / f64::from(whole);
+        self.sites.push(RefineSite {
+            piece,
+            uv: [0, 1].map(|axis| share(at[axis] - first[axis], side)),
+            offset: self
+                .shape
+                .ring_offset(place, at.map(|steps| share(steps, ONE))),
+            position_of,
+        });
+        self.samples.push(self.sample(on));
         vertex
     }
 
@@ -177,108 +179,6 @@ impl Builder<'_> {
                 }))
             }
             _ => None,
-        }
-    }
-
-    fn make(&mut self, piece: &Piece<'_>, place: Place, at: [u32; 2], on: On) -> u32 {
-        let shape = self.shape;
-        let side = ONE >> place.level;
-        let first = [place.u, place.v].map(|at| u32::from(at) * side);
-        let local = [0, 1].map(|axis| f64::from(at[axis] - first[axis]) / f64::from(side));
-        let mut sample = piece.evaluate(&self.points, local);
-        if shape.in_ring[place.face as usize] {
-            self.add_offset(&mut sample);
-        }
-        let cut = shape.place;
-        let start = cut.first_sample();
-        let (tile, border) = if let Some([x, y]) = self.sample(on) {
-            let rise = f64::from(shape.height([x, y])) * cut.unit - shape.origin[2];
-            sample.position = [f64::from(x) * cut.step[0], f64::from(y) * cut.step[1], rise];
-            let (tile, [row, column]) = cut.tile_at([start[0] + y, start[1] + x]);
-            (tile, tile << SAMPLE_BITS | (row * TILE_SAMPLES + column))
-        } else {
-            (self.tile_under(sample.position), NONE)
-        };
-        let mesh = &mut self.mesh;
-        let vertex = u32::try_from(mesh.positions.len()).unwrap_or(NONE);
-        mesh.positions.push(narrow(sample.position));
-        mesh.normals.push(narrow(
-            unit(cross(sample.du, sample.dv)).unwrap_or_default(),
-        ));
-        mesh.border.push(border);
-        mesh.tiles.push(tile);
-        vertex
-    }
-
-    /// Ring 1: the border's offset on top, with its slope.
-    fn add_offset(&self, sample: &mut Sample<f64>) {
-        let cut = &self.shape.place;
-        let at = [0, 1].map(|axis| sample.position[axis] / cut.step[axis]);
-        let slope = self.shape.border.slope(at);
-        for tangent in [&mut sample.du, &mut sample.dv] {
-            tangent[2] += cut.unit
-                * (0..2)
-                    .map(|axis| slope[axis] * tangent[axis] / cut.step[axis])
-                    .sum::<f64>();
-        }
-        sample.position[2] += cut.unit * self.shape.border.offset(at);
-    }
-
-    /// The group's tile under a position; the nearest of them where an overhang reaches past the cut.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "clamped to the cut, whose samples fit 32 bits"
-    )]
-    fn tile_under(&self, position: [f64; 3]) -> u32 {
-        let cut = &self.shape.place;
-        let (size, first) = (cut.size(), cut.first_sample());
-        let inside = |axis: usize| {
-            (position[axis] / cut.step[axis]).clamp(0.0, f64::from(size[axis])) as u32
-        };
-        cut.tile_at([first[0] + inside(1), first[1] + inside(0)]).0
-    }
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "metres from the cut's corner are f32"
-)]
-fn narrow(a: [f64; 3]) -> [f32; 3] {
-    a.map(|part| part as f32)
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
-    let length = a.iter().map(|part| part * part).sum::<f64>().sqrt();
-    (length > 1e-12).then(|| a.map(|part| part / length))
-}
-
-/// Where the surface has no tangent plane of its own, the triangles around decide.
-fn mend_normals(mesh: &mut FeatureMesh) {
-    let broken = |normal: &[f32; 3]| *normal == [0.0; 3];
-    if !mesh.normals.iter().any(broken) {
-        return;
-    }
-    let mut sums = vec![[0.0_f64; 3]; mesh.normals.len()];
-    for triangle in mesh.indices.chunks_exact(3) {
-        let [a, b, c] = [0, 1, 2].map(|i| mesh.positions[triangle[i] as usize].map(f64::from));
-        let edge = |to: [f64; 3]| [0, 1, 2].map(|axis| to[axis] - a[axis]);
-        let area = cross(edge(b), edge(c));
-        for &vertex in triangle {
-            (0..3).for_each(|axis| sums[vertex as usize][axis] += area[axis]);
-        }
-    }
-    for (normal, sum) in mesh.normals.iter_mut().zip(sums) {
-        if broken(normal) {
-            *normal = narrow(unit(sum).unwrap_or([0.0, 0.0, 1.0]));
         }
     }
 }

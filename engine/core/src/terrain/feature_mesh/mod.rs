@@ -1,7 +1,8 @@
 //! The mesh of a feature: an authored cage, laid into the ground of the finest level, becomes triangles.
 //!
 //! ```text
-//! laid cage ─refine once─▶ quads ─depths of a view─▶ tables ─execute─▶ patches ─templates─▶ FeatureMesh
+//! laid cage ─refine once─▶ quads ─depths of a view─▶ tables ─templates─▶ FeatureTable ─▶ device: stage `refine`
+//!                                                                                 └─▶ CPU: FeatureMesh
 //!
 //!   cut border   vertices are the terrain's own samples, at stride 1
 //!   ring 1       limit surface, and the border's residual fading to nothing over one patch
@@ -19,14 +20,14 @@ mod border;
 mod build;
 mod shape;
 pub mod synthetic;
+mod table;
 #[cfg(test)]
 mod tests;
 
 pub use shape::{CutPlace, FeatureShape};
+pub use table::FeatureTable;
 
-use crate::reference::shared::{FEATURE_BORDER, FeatureVertex, NONE};
-
-/// A feature as triangles.
+/// A feature as triangles, executed on the CPU.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FeatureMesh {
     /// World metres that positions are relative to: the cut's north-west lattice point, at a height near the ground's.
@@ -38,7 +39,7 @@ pub struct FeatureMesh {
     /// Three a triangle, counter-clockwise seen from outside.
     pub indices: Vec<u32>,
     /// For every vertex: the group's tile (its place in the group's list) `<< 15 |` the sample it is, on the cut's border;
-    /// [`NONE`] elsewhere.
+    /// [`NONE`](crate::reference::shared::NONE) elsewhere.
     pub border: Vec<u32>,
     /// For every vertex: the group's tile under it.
     pub tiles: Vec<u32>,
@@ -49,35 +50,5 @@ impl FeatureMesh {
     #[must_use]
     pub fn byte_count(&self) -> u64 {
         (self.positions.len() * (12 + 12 + 4 + 4) + self.indices.len() * 4) as u64
-    }
-
-    /// Bytes on the GPU.
-    #[must_use]
-    pub fn gpu_byte_count(&self) -> u64 {
-        (self.positions.len() * size_of::<FeatureVertex>() + self.indices.len() * 4) as u64
-    }
-
-    /// The vertices as the GPU gets them.
-    #[must_use]
-    pub fn vertices(&self) -> Vec<FeatureVertex> {
-        let parts = self.positions.iter().zip(&self.normals).zip(&self.tiles);
-        parts
-            .map(|((&position, &normal), &tile)| FeatureVertex {
-                position,
-                tile,
-                normal,
-                reserved: 0,
-            })
-            .collect()
-    }
-
-    /// The indices as the GPU gets them: border vertices are samples of tiles.
-    #[must_use]
-    pub fn draw_indices(&self) -> Vec<u32> {
-        let draw_index = |&index: &u32| match self.border[index as usize] {
-            NONE => index,
-            sample => FEATURE_BORDER | sample,
-        };
-        self.indices.iter().map(draw_index).collect()
     }
 }

@@ -1,12 +1,15 @@
 //! What of a feature's mesh does not depend on the view: its cage, refined once, in metres; which of its faces lie in
 //! ring 1; which of its vertices are samples of the ground.
 
-use super::{FeatureMesh, border::Border, build};
+use super::{FeatureMesh, FeatureTable, border::Border};
 use crate::{
     cage::{Cage, NONE, Topology, refine},
-    fas::{DepthRule, Features, Tables},
+    fas::{DepthRule, Features, Place, Tables},
     pyramid::PyramidError,
-    reference::shared::border::{QUAD_SAMPLES, TILE_CELLS},
+    reference::shared::{
+        border::{QUAD_SAMPLES, TILE_CELLS},
+        refine::RefineGround,
+    },
 };
 
 /// Where a cut lies.
@@ -35,10 +38,27 @@ impl CutPlace {
         [self.cut[0], self.cut[1]].map(|patch| patch * QUAD_SAMPLES)
     }
 
+    /// Rows and columns of the first and the last tile that the cut lies in.
+    fn tiles(&self) -> [[u32; 2]; 2] {
+        let last = [0, 1].map(|axis| (self.cut[axis + 2] * QUAD_SAMPLES - 1) / TILE_CELLS);
+        [self.first_sample().map(|sample| sample / TILE_CELLS), last]
+    }
+
+    /// The same as the stage `refine` knows it.
+    pub(super) fn ground(&self) -> RefineGround {
+        let [first, last] = self.tiles();
+        let sample = self.first_sample();
+        RefineGround {
+            step: self.step,
+            size: self.size(),
+            first: [1, 0].map(|axis| sample[axis] % TILE_CELLS),
+            tiles: [1, 0].map(|axis: usize| last[axis] - first[axis] + 1),
+        }
+    }
+
     /// The place in the group's list of the tile at a finest sample (row, column), and the sample's row and column there.
     pub(super) fn tile_at(&self, sample: [u32; 2]) -> (u32, [u32; 2]) {
-        let first = self.first_sample().map(|sample| sample / TILE_CELLS);
-        let last = [0, 1].map(|axis| (self.cut[axis + 2] * QUAD_SAMPLES - 1) / TILE_CELLS);
+        let [first, last] = self.tiles();
         let tile = [0, 1].map(|axis| (sample[axis] / TILE_CELLS).clamp(first[axis], last[axis]));
         let inside = [0, 1].map(|axis| sample[axis] - tile[axis] * TILE_CELLS);
         let place = (tile[0] - first[0]) * (last[1] - first[1] + 1) + tile[1] - first[1];
@@ -53,8 +73,8 @@ pub struct FeatureShape {
     /// Quads; metres east, north and up of the origin.
     pub(super) cage: Cage,
     pub(super) features: Features,
-    /// For every face: true in ring 1.
-    pub(super) in_ring: Vec<bool>,
+    /// For every face in ring 1: its corners' columns and rows on the lattice.
+    pub(super) ring: Vec<Option<[[f64; 2]; 4]>>,
     /// For every vertex: column and row in the cut of the sample it is, on the cut's border.
     pub(super) samples: Vec<Option<[u32; 2]>>,
     pub(super) border: Border,
@@ -93,7 +113,7 @@ impl FeatureShape {
         let cage = fine.moved(metres).map_err(refused)?;
         let mut shape = Self {
             features: Features::of(&cage),
-            in_ring: ring_faces(laid, place.size()),
+            ring: ring_faces(laid, place.size()),
             samples,
             border: Border::new(place.size()),
             heights,
@@ -144,8 +164,47 @@ impl FeatureShape {
     ///
     /// When there are not as many depths as vertices.
     pub fn mesh(&self, depths: &[u8]) -> Result<FeatureMesh, PyramidError> {
+        Ok(self.table(depths)?.execute(self))
+    }
+
+    /// The mesh at depths before it has positions, for a device.
+    ///
+    /// # Errors
+    ///
+    /// When there are not as many depths as vertices.
+    pub fn table(&self, depths: &[u8]) -> Result<FeatureTable, PyramidError> {
         let tables = Tables::adaptive(self.cage.topology(), depths).map_err(refused)?;
-        Ok(build::mesh(self, &tables))
+        Ok(FeatureTable::new(self, tables))
+    }
+
+    /// Ring 1: metres of the border's offset at (u, v) of a place's face, and how it slopes along u and v of the place.
+    ///
+    /// Faces of ring 1 are the lattice's, so the offset is one of parameters alone and needs no point of the surface.
+    pub(super) fn ring_offset(&self, place: Place, [u, v]: [f64; 2]) -> Option<[f64; 3]> {
+        let [a, b, _, d] = self.ring[place.face as usize]?;
+        let along = |end: [f64; 2]| [0, 1].map(|axis| end[axis] - a[axis]);
+        let (by_u, by_v) = (along(b), along(d));
+        let at = [0, 1].map(|axis| a[axis] + u * by_u[axis] + v * by_v[axis]);
+        let slope = self.border.slope(at);
+        let side = f64::from(place.level).exp2().recip();
+        let tilt = |by: [f64; 2]| side * (slope[0] * by[0] + slope[1] * by[1]);
+        let units = [self.border.offset(at), tilt(by_u), tilt(by_v)];
+        Some(units.map(|units| units * self.place.unit))
+    }
+
+    /// The group's tile under a position; the nearest of them where an overhang reaches past the cut.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to the cut, whose samples fit 32 bits"
+    )]
+    pub(super) fn tile_under(&self, position: [f64; 3]) -> u32 {
+        let (cut, size) = (&self.place, self.place.size());
+        let first = cut.first_sample();
+        let inside = |axis: usize| {
+            (position[axis] / cut.step[axis]).clamp(0.0, f64::from(size[axis])) as u32
+        };
+        cut.tile_at([first[0] + inside(1), first[1] + inside(0)]).0
     }
 
     /// Vertices of the refined cage: as many depths make a mesh.
@@ -177,7 +236,7 @@ impl FeatureShape {
         let points = tables.execute(self.cage.positions());
         for patch in &tables.render.patches {
             let face = patch.place.face;
-            if !self.in_ring[face as usize] {
+            if self.ring[face as usize].is_none() {
                 continue;
             }
             for side in 0..4 {
@@ -246,36 +305,52 @@ fn sample_on_border(at: [f64; 2], size: [u32; 2]) -> Option<[u32; 2]> {
     (is_sample && on_border).then(|| whole.map(|at| at as u32))
 }
 
-/// For every face of the refined cage: true when its parent is a lattice quad at the border of the cut.
-fn ring_faces(laid: &Cage, size: [u32; 2]) -> Vec<bool> {
+/// For every face of the refined cage whose parent is a lattice quad at the border of the cut: its corners on the lattice.
+fn ring_faces(laid: &Cage, size: [u32; 2]) -> Vec<Option<[[f64; 2]; 4]>> {
     let topology = laid.topology();
-    let quad = f64::from(QUAD_SAMPLES);
-    let is_ring = |face: u32| {
-        let corners = topology.face_vertices(face);
-        if corners.len() != 4 || topology.is_hole(face) {
-            return false;
-        }
-        let axis = |axis: usize| {
-            let at = corners
-                .iter()
-                .map(|&corner| laid.positions()[corner as usize][axis]);
-            at.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| {
-                [low.min(at), high.max(at)]
-            })
-        };
-        let spans = [axis(0), axis(1)];
-        let is_lattice = spans
-            .iter()
-            .all(|[low, high]| high - low == quad && low % quad == 0.0);
-        let touches =
-            (0..2).any(|axis| spans[axis][0] == 0.0 || spans[axis][1] == f64::from(size[axis]));
-        is_lattice && touches
-    };
-    let parents =
-        (0..topology.face_count()).map(|face| (is_ring(face), topology.face_corners(face).len()));
-    parents
-        .flat_map(|(is_ring, corners)| std::iter::repeat_n(is_ring, corners))
-        .collect()
+    let quads = (0..topology.face_count()).flat_map(|face| {
+        let quad = lattice_corners(laid, face).filter(|quad| touches_border(quad, size));
+        let middle =
+            |a: [f64; 2], b: [f64; 2]| [0, 1].map(|axis: usize| f64::midpoint(a[axis], b[axis]));
+        // A corner's child runs from it to its side's middle, the centre, and the middle of the side before it.
+        (0..topology.face_corners(face).len()).map(move |corner| {
+            let quad = quad?;
+            let [own, next, across, previous] = [0, 1, 2, 3].map(|i| quad[(corner + i) % 4]);
+            let sides = [middle(own, next), middle(own, previous)];
+            Some([own, sides[0], middle(own, across), sides[1]])
+        })
+    });
+    quads.collect()
+}
+
+/// Columns and rows of a face's corners where it is a quad of the lattice.
+fn lattice_corners(laid: &Cage, face: u32) -> Option<[[f64; 2]; 4]> {
+    let topology = laid.topology();
+    let corners: [u32; 4] = topology.face_vertices(face).try_into().ok()?;
+    let quad = corners.map(|corner| {
+        let [x, y, _] = laid.positions()[corner as usize];
+        [x, y]
+    });
+    let spans = [0, 1].map(|axis| span(&quad, axis));
+    let side = f64::from(QUAD_SAMPLES);
+    let is_lattice = spans
+        .iter()
+        .all(|[low, high]| high - low == side && low % side == 0.0);
+    (is_lattice && !topology.is_hole(face)).then_some(quad)
+}
+
+fn touches_border(quad: &[[f64; 2]; 4], size: [u32; 2]) -> bool {
+    (0..2).any(|axis| {
+        let [low, high] = span(quad, axis);
+        low == 0.0 || high == f64::from(size[axis])
+    })
+}
+
+fn span(quad: &[[f64; 2]; 4], axis: usize) -> [f64; 2] {
+    quad.iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], at| {
+            [low.min(at[axis]), high.max(at[axis])]
+        })
 }
 
 /// Heights of the border's samples, clockwise from the north-west corner.
