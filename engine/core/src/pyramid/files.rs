@@ -102,11 +102,7 @@ pub(super) fn read_exact_at(
 
 /// As on Unix.
 #[cfg(windows)]
-pub(super) fn write_all_at(
-    file: &File,
-    mut bytes: &[u8],
-    mut offset: u64,
-) -> std::io::Result<()> {
+pub(super) fn write_all_at(file: &File, mut bytes: &[u8], mut offset: u64) -> std::io::Result<()> {
     while !bytes.is_empty() {
         let count = std::os::windows::fs::FileExt::seek_write(file, bytes, offset)?;
         bytes = &bytes[count..];

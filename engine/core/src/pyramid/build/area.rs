@@ -54,9 +54,8 @@ impl Area {
 
     /// With so many more rows and columns on every side.
     pub(super) fn grown(&self, [rows, columns]: [usize; 2]) -> Self {
-        let grow = |range: &Range<i64>, by: usize| {
-            range.start - to_signed(by)..range.end + to_signed(by)
-        };
+        let grow =
+            |range: &Range<i64>, by: usize| range.start - to_signed(by)..range.end + to_signed(by);
         Self {
             rows: grow(&self.rows, rows),
             columns: grow(&self.columns, columns),

@@ -215,7 +215,9 @@ mod tests {
                 .flat_map(|row| columns.clone().map(move |column| (row, column)));
             let mut samples =
                 Samples::new(area.clone(), places.map(|(r, c)| height(r, c)).collect());
-            for (row, column) in (0..samples.rows).flat_map(|r| (0..area.size()[1]).map(move |c| (r, c))) {
+            for (row, column) in
+                (0..samples.rows).flat_map(|r| (0..area.size()[1]).map(move |c| (r, c)))
+            {
                 if (row + usize::try_from(area.rows.start).unwrap()) % 50 == 13 && column % 2 == 0 {
                     samples.set_void(row, column);
                 }
@@ -256,14 +258,25 @@ mod tests {
 
     #[test]
     fn any_part_runs_on_as_the_whole_does() {
-        for (data, size) in [([900, 1030], [1025, 1281]), ([1, 700], [257, 769]), ([257, 3], [257, 257])] {
+        for (data, size) in [
+            ([900, 1030], [1025, 1281]),
+            ([1, 700], [257, 769]),
+            ([257, 3], [257, 257]),
+        ] {
             let whole = continued(&Area::whole(size), data, size, load(rough)).unwrap();
             let middle = size.map(|count| count / 2);
-            for (first, last) in [(data, size), ([0, middle[1]], [middle[0], size[1]]), (middle, size)] {
+            for (first, last) in [
+                (data, size),
+                ([0, middle[1]], [middle[0], size[1]]),
+                (middle, size),
+            ] {
                 let first = [0, 1].map(|axis| first[axis].min(last[axis] - 1));
                 let area = Area::new(first[0]..last[0], first[1]..last[1]);
                 let part = continued(&area, data, size, load(rough)).unwrap();
-                assert!(part.values == whole.crop(&area).values, "{area:?} of {data:?}");
+                assert!(
+                    part.values == whole.crop(&area).values,
+                    "{area:?} of {data:?}"
+                );
             }
         }
     }
@@ -275,7 +288,10 @@ mod tests {
         let samples = mirrored(&area, [129, 257], load(slope)).unwrap();
         for (row, at) in area.rows.clone().enumerate() {
             for (column, place) in area.columns.clone().enumerate() {
-                assert_eq!(samples.values[row * samples.columns + column], slope(at, place));
+                assert_eq!(
+                    samples.values[row * samples.columns + column],
+                    slope(at, place)
+                );
             }
         }
     }

@@ -259,7 +259,9 @@ mod tests {
     #[test]
     fn piecewise_linear_data_comes_back_exactly() {
         let area = Area::new(0..129, 0..129);
-        let coarse = fitted(&HATS, &area, |row, column| 40 * (row - 100).abs() - 12 * column);
+        let coarse = fitted(&HATS, &area, |row, column| {
+            40 * (row - 100).abs() - 12 * column
+        });
         for (index, value) in (0..).zip(coarse) {
             let [row, column] = [index / 129, index % 129];
             assert_eq!(value, 40 * (2 * row - 100_i32).abs() - 24 * column);

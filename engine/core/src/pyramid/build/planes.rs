@@ -54,8 +54,7 @@ impl SamplePlane {
         let mut packed: Vec<[i32; 1]> = samples.values.iter().map(|height| [height << 1]).collect();
         if samples.voids.is_some() {
             for (at, number) in packed.iter_mut().enumerate() {
-                number[0] |=
-                    i32::from(samples.is_void(at / samples.columns, at % samples.columns));
+                number[0] |= i32::from(samples.is_void(at / samples.columns, at % samples.columns));
             }
         }
         self.0.write(area, &samples.area, &packed)
@@ -88,7 +87,12 @@ impl ControlPlane {
 
     /// The controls of an area of the plane, row by row.
     pub(super) fn read(&self, area: &Area) -> Result<Vec<i32>, PyramidError> {
-        Ok(self.0.read(area)?.into_iter().map(|[control]| control).collect())
+        Ok(self
+            .0
+            .read(area)?
+            .into_iter()
+            .map(|[control]| control)
+            .collect())
     }
 
     /// Writes the part of some controls, those of `within`, that lies in an area.
@@ -117,7 +121,10 @@ mod tests {
         plane.write(&Area::whole([4, 5]), &samples).unwrap();
         assert_eq!(plane.read(&Area::whole([4, 5])).unwrap(), samples);
         let beyond = plane.read_mirrored(&Area::new(0..6, 2..5)).unwrap();
-        assert_eq!(beyond.values[5 * 3], 2 * samples.values[17] - samples.values[7]);
+        assert_eq!(
+            beyond.values[5 * 3],
+            2 * samples.values[17] - samples.values[7]
+        );
         assert!(beyond.is_void(4, 1));
     }
 }

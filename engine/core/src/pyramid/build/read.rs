@@ -1,6 +1,6 @@
 //! The finest level's samples: the raster's own heights, rounded to units.
 
-use super::area::{Area, Blocks};
+use super::area::Area;
 use super::passes::in_order;
 use super::planes::SamplePlane;
 use super::samples::Samples;
@@ -103,10 +103,7 @@ fn read_window(raster: &dyn Raster, unit: f64, window: Window) -> Result<Samples
     let mut heights = vec![0.0; window.rows as usize * columns];
     raster.read(window, &mut heights)?;
     let [row, column] = [window.row as usize, window.column as usize];
-    let area = Area::new(
-        row..row + window.rows as usize,
-        column..column + columns,
-    );
+    let area = Area::new(row..row + window.rows as usize, column..column + columns);
     let mut samples = Samples::new(area, vec![0; heights.len()]);
     for (at, height) in heights.into_iter().enumerate() {
         let [down, across] = [at / columns, at % columns];

@@ -140,7 +140,9 @@ impl Samples {
             let start = (first_row + row) * self.columns + first_column;
             &self.values[start..start + columns]
         };
-        let values = (0..rows).flat_map(|row| line(row).iter().copied()).collect();
+        let values = (0..rows)
+            .flat_map(|row| line(row).iter().copied())
+            .collect();
         let mut part = Self::new(area.clone(), values);
         if self.voids.is_some() {
             for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |c| (row, c))) {
@@ -200,7 +202,11 @@ mod tests {
         let mut whole = rough(Area::new(10..30, 5..200));
         whole.set_void(3, 70);
         let mut again = Samples::new(whole.area.clone(), vec![0; whole.values.len()]);
-        for area in [Area::new(10..14, 5..200), Area::new(14..30, 5..70), Area::new(14..30, 70..200)] {
+        for area in [
+            Area::new(10..14, 5..200),
+            Area::new(14..30, 5..70),
+            Area::new(14..30, 70..200),
+        ] {
             again.put(&whole.crop(&area));
         }
         assert_eq!(again, whole);

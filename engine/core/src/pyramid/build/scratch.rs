@@ -133,7 +133,8 @@ impl<const N: usize> Plane<N> {
     fn files_of(&self, area: &Area) -> impl Iterator<Item = usize> + use<N> {
         let [rows, columns] = self.blocks.shape();
         let files = |range: &std::ops::Range<i64>, count: usize| {
-            let file = |place: i64| (usize::try_from(place).unwrap_or(0) / FILE_SIDE).min(count - 1);
+            let file =
+                |place: i64| (usize::try_from(place).unwrap_or(0) / FILE_SIDE).min(count - 1);
             if range.is_empty() {
                 0..0
             } else {
@@ -181,7 +182,10 @@ mod tests {
         let size = [4100, 8300];
         let plane = Plane::<2>::create(folder.path(), "a", size).unwrap();
         let entry = |row: i64, column: i64| {
-            [i32::try_from(row * 10_000 + column).unwrap(), i32::try_from(row).unwrap()]
+            [
+                i32::try_from(row * 10_000 + column).unwrap(),
+                i32::try_from(row).unwrap(),
+            ]
         };
         let entries = |area: &Area| -> Vec<[i32; 2]> {
             let columns = area.columns.clone();
@@ -191,7 +195,10 @@ mod tests {
                 .collect()
         };
         let all = Area::new(4090..4100, 0..8300);
-        for part in [Area::new(4090..4097, 0..8300), Area::new(4097..4100, 0..8300)] {
+        for part in [
+            Area::new(4090..4097, 0..8300),
+            Area::new(4097..4100, 0..8300),
+        ] {
             plane.write(&part, &all, &entries(&all)).unwrap();
         }
         for area in [

@@ -151,9 +151,7 @@ fn between(coarser: &Samples, row: i64, column: i64) -> i32 {
     };
     let rows = near(row, &coarser.area.rows);
     let columns = near(column, &coarser.area.columns);
-    let at = |row: usize, column: usize| {
-        i64::from(coarser.values[row * coarser.columns + column])
-    };
+    let at = |row: usize, column: usize| i64::from(coarser.values[row * coarser.columns + column]);
     let line = |row: usize| 3 * at(row, columns[0]) + at(row, columns[1]);
     mean(3 * line(rows[0]) + line(rows[1]), 16)
 }
@@ -231,7 +229,11 @@ mod tests {
         for row in 0..129 {
             for column in 0..129 {
                 let error = (level.values[row * 129 + column] - slope(row, column)).abs();
-                let limit = if row <= 100 && hole(row, column) { 120 } else { 0 };
+                let limit = if row <= 100 && hole(row, column) {
+                    120
+                } else {
+                    0
+                };
                 assert!(error <= limit, "{row} {column} {error}");
             }
         }
@@ -249,7 +251,9 @@ mod tests {
 
     #[test]
     fn one_known_sample_fills_all() {
-        let level = filled(100, 32, |row, column| (row == 3 && column == 99).then_some(41));
+        let level = filled(100, 32, |row, column| {
+            (row == 3 && column == 99).then_some(41)
+        });
         assert!(level.values.iter().all(|height| *height == 41));
     }
 }
