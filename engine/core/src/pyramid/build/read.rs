@@ -47,19 +47,19 @@ pub(super) fn window_samples(raster: &dyn Raster, window_samples: u64) -> u64 {
     u64::from(shape[0]) * u64::from(shape[1])
 }
 
-/// Rows and columns of the windows: whole parts of the file where they fit, rather wide than high, so that parts as
-/// wide as the raster are read once.
+/// Rows and columns of the windows: whole parts of the file, or pieces of one where it is larger than a window may be;
+/// rather wide than high, so that parts as wide as the raster are read once.
 fn window_shape(grid: &Grid, [part_rows, part_columns]: [u32; 2], samples: u64) -> [u32; 2] {
     let fit = |count: u64, part: u32, all: u32| {
-        let part = part.clamp(1, all);
-        let parts = u32::try_from(count / u64::from(part)).unwrap_or(u32::MAX);
-        parts.max(1).saturating_mul(part).min(all)
+        let count = u32::try_from(count).unwrap_or(u32::MAX).clamp(1, all);
+        count - if count < part { 0 } else { count % part.max(1) }
     };
-    let least = part_rows.max(LEAST_ROWS).min(grid.rows);
-    let columns = fit(samples / u64::from(least), part_columns, grid.columns);
-    let columns = columns.min(u32::try_from(samples).unwrap_or(u32::MAX).max(1));
-    let rows = fit(samples / u64::from(columns), part_rows, grid.rows);
-    [rows, columns]
+    let least = u64::from(part_rows.max(LEAST_ROWS).min(grid.rows));
+    let columns = fit(samples / least, part_columns, grid.columns);
+    [
+        fit(samples / u64::from(columns), part_rows, grid.rows),
+        columns,
+    ]
 }
 
 /// The windows of a grid, row by row.

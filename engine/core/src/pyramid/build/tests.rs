@@ -288,7 +288,7 @@ fn summaries_enclose_all_below() {
             assert_eq!(
                 summary,
                 built
-                    .records
+                    .tiles
                     .get(child)
                     .map_or(Summary::default(), |child| child.summary)
             );
@@ -393,7 +393,7 @@ fn a_memory_budget_too_small_is_refused_beforehand() {
 }
 
 #[test]
-fn any_number_of_threads_writes_the_same_bytes() {
+fn any_number_of_threads_and_any_memory_writes_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let field = Field::new(700, 421, |row, column| {
         if row.abs_diff(200) < 9 {
@@ -402,9 +402,18 @@ fn any_number_of_threads_writes_the_same_bytes() {
             hills(row, column)
         }
     });
-    let trees = [1, 4].map(|threads| {
-        let options = options(folder.path(), &format!("out{threads}"), threads);
+    let budgets = [(1, 64), (1, 72), (4, 100), (4, 1000)];
+    let trees = budgets.map(|(threads, budget_mib)| {
+        let options = BuildOptions {
+            memory_budget: Some(budget_mib << 20),
+            ..options(
+                folder.path(),
+                &format!("out{threads}-{budget_mib}"),
+                threads,
+            )
+        };
         let report = run(&field, &options).unwrap();
+        assert!(report.memory_bytes <= budget_mib << 20);
         assert_eq!(
             (report.samples, report.levels, report.void_samples),
             ([700, 421], 4, 17 * 421)
@@ -413,7 +422,7 @@ fn any_number_of_threads_writes_the_same_bytes() {
         tree(&options.output, "", &mut files);
         files
     });
-    assert!(trees[0] == trees[1]);
+    assert!(trees.iter().all(|tree| *tree == trees[0]));
     assert!(trees[0].len() > 6);
 }
 
