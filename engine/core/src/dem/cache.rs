@@ -34,6 +34,11 @@ impl Cache {
         }
     }
 
+    /// Bytes of the parts that are kept, but for a last one that is larger.
+    pub(super) const fn budget_bytes(&self) -> usize {
+        self.budget_bytes
+    }
+
     /// A part, decoded by `decode` unless it is there; two threads never decode the same part at once.
     pub(super) fn get(
         &self,

@@ -88,6 +88,10 @@ impl Raster for Memory {
         self.flip.turn(window, out);
         Ok(())
     }
+
+    fn memory_bytes(&self) -> u64 {
+        self.samples.byte_len() as u64
+    }
 }
 
 /// Refuses rasters that would take too much memory, before any is taken.

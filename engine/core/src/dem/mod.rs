@@ -50,6 +50,14 @@ pub trait Raster: Send + Sync {
     /// [`DemError::Window`] when the window leaves the grid or `out.len()` is not rows × columns; else what is wrong
     /// with the file at that place.
     fn read(&self, window: Window, out: &mut [f64]) -> Result<(), DemError>;
+
+    /// Rows and columns of the parts that the samples are stored in: windows of whole parts read each but once.
+    fn part_shape(&self) -> [u32; 2] {
+        [1, self.header().grid.columns]
+    }
+
+    /// Bytes it keeps in memory at most, besides a few a part.
+    fn memory_bytes(&self) -> u64;
 }
 
 /// Opens an elevation model of any known format, told by its content.

@@ -99,6 +99,21 @@ impl Raster for Mosaic {
         }
         Ok(())
     }
+
+    fn part_shape(&self) -> [u32; 2] {
+        self.parts
+            .first()
+            .map_or([1, self.header.grid.columns], |part| {
+                part.raster.part_shape()
+            })
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        self.parts
+            .iter()
+            .map(|part| part.raster.memory_bytes())
+            .sum()
+    }
 }
 
 impl Part {

@@ -87,4 +87,8 @@ impl Raster for Plain {
         self.flip.turn(window, out);
         Ok(())
     }
+
+    fn memory_bytes(&self) -> u64 {
+        0
+    }
 }

@@ -88,6 +88,15 @@ impl Raster for Tiff {
         self.flip.turn(window, out);
         Ok(())
     }
+
+    fn part_shape(&self) -> [u32; 2] {
+        let table = &self.chunks.table;
+        [table.chunk_rows, table.chunk_columns]
+    }
+
+    fn memory_bytes(&self) -> u64 {
+        self.chunks.memory_bytes()
+    }
 }
 
 /// The coding of an elevation model, or why there are no heights to read.

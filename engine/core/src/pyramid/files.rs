@@ -1,4 +1,4 @@
-//! Files that are whole or not there.
+//! Files that are whole or not there, and bytes at places of files.
 
 use std::{
     fs::{self, File},
@@ -17,13 +17,16 @@ pub(super) fn sibling(path: &Path, suffix: &str) -> PathBuf {
 
 /// Writes a file so that it is whole or not there, on the disk and not only in the cache.
 pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PyramidError> {
-    write_whole_with(path, |file| file.write_all(bytes))
+    write_whole_with(path, |file| {
+        file.write_all(bytes)
+            .map_err(PyramidError::io("writing", path))
+    })
 }
 
 /// As [`write_whole`], for bytes that are written in pieces.
 pub(super) fn write_whole_with(
     path: &Path,
-    write: impl FnOnce(&mut File) -> std::io::Result<()>,
+    write: impl FnOnce(&mut File) -> Result<(), PyramidError>,
 ) -> Result<(), PyramidError> {
     let partial = sibling(path, ".partial");
     let folder = path.parent().unwrap_or(Path::new("."));
@@ -34,11 +37,15 @@ pub(super) fn write_whole_with(
         .create(true)
         .truncate(true)
         .open(&partial)
-        .and_then(|mut file| write(&mut file).and_then(|()| file.sync_all()));
+        .map_err(PyramidError::io("creating", &partial))
+        .and_then(|mut file| {
+            write(&mut file)?;
+            file.sync_all().map_err(PyramidError::io("flushing", path))
+        });
     if let Err(error) = written {
         // What is left of it is in the way of nothing; the first error is the one to tell.
         let _ = fs::remove_file(&partial);
-        return Err(PyramidError::io("writing", path)(error));
+        return Err(error);
     }
     fs::rename(&partial, path).map_err(PyramidError::io("renaming", &partial))?;
     sync_folder(folder)
@@ -60,5 +67,46 @@ pub(super) fn sync_folder(folder: &Path) -> Result<(), PyramidError> {
 /// Folders cannot be flushed here.
 #[cfg(not(unix))]
 pub(super) fn sync_folder(_: &Path) -> Result<(), PyramidError> {
+    Ok(())
+}
+
+/// Fills a buffer from a place of a file on; the file's own position may move.
+#[cfg(unix)]
+pub(super) fn read_exact_at(file: &File, buffer: &mut [u8], offset: u64) -> std::io::Result<()> {
+    std::os::unix::fs::FileExt::read_exact_at(file, buffer, offset)
+}
+
+/// Writes bytes from a place of a file on; the file's own position may move.
+#[cfg(unix)]
+pub(super) fn write_all_at(file: &File, bytes: &[u8], offset: u64) -> std::io::Result<()> {
+    std::os::unix::fs::FileExt::write_all_at(file, bytes, offset)
+}
+
+/// As on Unix.
+#[cfg(windows)]
+pub(super) fn read_exact_at(
+    file: &File,
+    mut buffer: &mut [u8],
+    mut offset: u64,
+) -> std::io::Result<()> {
+    while !buffer.is_empty() {
+        let count = std::os::windows::fs::FileExt::seek_read(file, buffer, offset)?;
+        if count == 0 {
+            return Err(std::io::ErrorKind::UnexpectedEof.into());
+        }
+        buffer = &mut buffer[count..];
+        offset += count as u64;
+    }
+    Ok(())
+}
+
+/// As on Unix.
+#[cfg(windows)]
+pub(super) fn write_all_at(file: &File, mut bytes: &[u8], mut offset: u64) -> std::io::Result<()> {
+    while !bytes.is_empty() {
+        let count = std::os::windows::fs::FileExt::seek_write(file, bytes, offset)?;
+        bytes = &bytes[count..];
+        offset += count as u64;
+    }
     Ok(())
 }

@@ -36,7 +36,7 @@ pub use shard::{SHARD_TILES, shard_count, shard_shape};
 pub use store::{FaultStore, Faults, FileStore, MappedStore, Store, StoreError};
 pub use tile::{Summary, Tile};
 pub use validate::{Finding, Report, validate};
-pub use writer::{PyramidWriter, ShardInfo};
+pub use writer::{Contents, PyramidWriter, ShardInfo};
 
 /// Texels a side of a colour tile.
 pub const COLOR_TEXELS: usize = 256;

@@ -89,7 +89,7 @@ pub(super) fn write_with(writer: &PyramidWriter, rows: u32, columns: u32) -> Vec
             (0..shard_rows).flat_map(|row| (0..shard_columns).map(move |column| [row, column]))
         {
             let layout = RecordLayout::new(level);
-            let record = |tile: TileId| records.get(&tile).cloned();
+            let record = |tile: TileId| Ok(records.get(&tile).cloned());
             shards.push(
                 writer
                     .write_shard(index, &layout, level.tiles, shard, &record)
@@ -97,7 +97,7 @@ pub(super) fn write_with(writer: &PyramidWriter, rows: u32, columns: u32) -> Vec
             );
         }
     }
-    let texels = |tile: TileId| Some(vec![tile.level + 9; COLOR_TEXELS * COLOR_TEXELS * 4]);
+    let texels = |tile: TileId| Ok(Some(vec![tile.level + 9; COLOR_TEXELS * COLOR_TEXELS * 4]));
     shards.push(
         writer
             .write_color_shard(0, [1, 1], [0, 0], &texels)

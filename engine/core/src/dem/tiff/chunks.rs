@@ -32,6 +32,11 @@ impl Chunks {
         }
     }
 
+    /// Bytes of decoded strips or tiles that are kept at most.
+    pub(super) fn memory_bytes(&self) -> u64 {
+        self.cache.budget_bytes() as u64
+    }
+
     /// Visits every sample of a stored window once, in rows.
     pub(super) fn visit(
         &self,

@@ -36,7 +36,7 @@ pub(super) fn write(
         }
         let [rows, columns] = shard_count(tiles);
         for shard in (0..rows).flat_map(|row| (0..columns).map(move |column| [row, column])) {
-            let texels = |tile: TileId| Some(lattice.tile(tile));
+            let texels = |tile: TileId| Ok(Some(lattice.tile(tile)));
             infos.push(writer.write_color_shard(level, tiles, shard, &texels)?);
         }
         advance(1)?;

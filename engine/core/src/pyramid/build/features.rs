@@ -2,34 +2,17 @@
 
 use std::collections::BTreeMap;
 
+use super::errors::ceil_f32;
+use super::ground::StoredGround;
 use super::levels::Levels;
-use super::quantise::LevelCage;
-use super::records::ceil_f32;
-use super::samples::LevelSamples;
 use crate::cage::write_obj;
 use crate::dem::RasterHeader;
 use crate::geo::{Grid, TileId};
 use crate::pyramid::feature::{
-    FeatureGroup, FeatureInput, FeatureMetadata, Ground, Site, encode, lay_all, tiles_of,
+    FeatureGroup, FeatureInput, FeatureMetadata, Site, encode, lay_all, tiles_of,
 };
 use crate::pyramid::zarr::FEATURE_BYTES_LIMIT;
 use crate::pyramid::{PyramidError, PyramidWriter, ShardInfo, Summary, shard_count};
-
-/// The finest level as stored.
-struct Finest<'a> {
-    samples: &'a LevelSamples,
-    cage: &'a LevelCage,
-}
-
-impl Ground for Finest<'_> {
-    fn control(&self, row: i64, column: i64) -> i32 {
-        self.cage.control(row, column)
-    }
-
-    fn sample(&self, row: u32, column: u32) -> i32 {
-        self.samples.values[row as usize * self.samples.columns + column as usize]
-    }
-}
 
 /// What a tile knows of the features in it.
 #[derive(Clone, Copy)]
@@ -59,10 +42,10 @@ impl Features {
         unit: f64,
     ) -> Result<Self, PyramidError> {
         let finest = header.grid.level_count() - 1;
-        let ground = Finest {
-            samples: &levels.samples[usize::from(finest)],
-            cage: &levels.cages[usize::from(finest)],
-        };
+        let ground = StoredGround::new(
+            &levels.samples[usize::from(finest)],
+            &levels.cages[usize::from(finest)],
+        );
         let site = Site {
             grid: &header.grid,
             crs: &header.crs,
@@ -75,7 +58,9 @@ impl Features {
             touched: BTreeMap::new(),
             records: BTreeMap::new(),
         };
-        for (id, laid) in (0..).zip(lay_all(inputs, &site)?) {
+        let laid = lay_all(inputs, &site);
+        ground.check()?;
+        for (id, laid) in (0..).zip(laid?) {
             let tiles = tiles_of(finest, laid.cut);
             let touch = Touch {
                 error: ceil_f32(laid.error),
@@ -153,7 +138,7 @@ impl Features {
         (0..rows)
             .flat_map(|row| (0..columns).map(move |column| [row, column]))
             .map(|shard| {
-                let record = |tile: TileId| self.records.get(&tile).cloned();
+                let record = |tile: TileId| Ok(self.records.get(&tile).cloned());
                 let bytes = metadata.record_bytes;
                 writer.write_feature_shard(self.finest, bytes, tiles, shard, &record)
             })

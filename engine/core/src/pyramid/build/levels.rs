@@ -1,14 +1,24 @@
 //! All levels of a pyramid while it is built: up fitting, down quantising, and the heights a reader will see.
+//!
+//! Every pass goes over the blocks of a level's plane, reads what a block depends on from the planes of the passes
+//! before, halo included, and writes the block. `ARCHITECTURE.md` draws what depends on what.
 
-use rayon::prelude::*;
+use std::path::Path;
 
+use super::area::{Area, Blocks};
+use super::border::{continued, plane_size};
+use super::fit::{HATS, SPLINES};
 use super::options::{Stage, Watch};
-use super::quantise::{LevelCage, is_key, key_width, quantise};
-use super::samples::{LevelSamples, array_size};
+use super::passes::in_order;
+use super::plan::Shape;
+use super::planes::{ControlPlane, SamplePlane};
+use super::quantise::{Cage, is_key, key_width, quantise};
+use super::read::read_finest;
+use super::samples::Samples;
 use super::scale::Scale;
-use super::{fit, sample, voids};
+use super::voids;
 use crate::dem::Raster;
-use crate::geo::Grid;
+use crate::geo::{Grid, QUAD_SAMPLES, TILE_CELLS, TILE_QUADS};
 use crate::pyramid::surface::{decode_heights, encode_detail};
 use crate::pyramid::{Level, PyramidError, number_bytes};
 
@@ -16,10 +26,12 @@ use crate::pyramid::{Level, PyramidError, number_bytes};
 pub(super) struct Levels {
     /// What the metadata say of each.
     pub(super) levels: Vec<Level>,
-    /// The samples, as stored once [`Levels::settle`] is done.
-    pub(super) samples: Vec<LevelSamples>,
-    /// The cages, as stored.
-    pub(super) cages: Vec<LevelCage>,
+    /// The samples of each, as stored: of whole tiles.
+    pub(super) samples: Vec<SamplePlane>,
+    /// The cages of each, as stored.
+    pub(super) cages: Vec<ControlPlane>,
+    /// Finest samples that are void.
+    pub(super) void_count: u64,
 }
 
 impl Levels {
@@ -27,134 +39,306 @@ impl Levels {
     pub(super) fn new(
         raster: &dyn Raster,
         scale: &Scale,
+        shape: &Shape,
+        scratch: &Path,
         watch: &Watch<'_>,
     ) -> Result<Self, PyramidError> {
-        let grid = raster.header().grid;
-        let samples = Self::rise(raster, &grid, scale, watch)?;
-        let mut levels = Self::fit(samples, &grid, scale, watch)?;
-        levels.settle(watch)?;
+        let rise = Rise {
+            grid: raster.header().grid,
+            scratch,
+            side: shape.block_side(),
+        };
+        let mut void_count = 0;
+        let finest = rise.finest(raster, scale, shape, watch, &mut void_count)?;
+        let fitted = rise.coarser(finest, watch)?;
+        let mut levels = Self {
+            levels: Vec::new(),
+            samples: Vec::new(),
+            cages: Vec::new(),
+            void_count,
+        };
+        let tiles = (0..rise.grid.level_count()).map(|level| tile_count(&rise.grid, level));
+        let advance = watch.stage(Stage::Encode, tiles.sum());
+        for (level, fitted) in (0..).zip(fitted) {
+            levels.settle(&rise, scale, level, &fitted, &advance)?;
+            fitted.remove()?;
+        }
         Ok(levels)
     }
 
-    /// Bytes at the peak of [`Levels::new`].
-    pub(super) fn memory_bytes(grid: &Grid) -> u64 {
-        let count = |level: u8| {
-            array_size(grid, level)
-                .iter()
-                .map(|side| *side as u64)
-                .product::<u64>()
+    /// Fits and quantises a level's cage and replaces its samples by the heights a reader will decode.
+    ///
+    /// Encoding those again gives the same codes, so no plane of codes is kept.
+    fn settle(
+        &mut self,
+        rise: &Rise<'_>,
+        scale: &Scale,
+        level: u8,
+        fitted: &SamplePlane,
+        advance: &(dyn Fn(u64) -> Result<(), PyramidError> + Sync),
+    ) -> Result<(), PyramidError> {
+        let tiles = rise.grid.tiles(level);
+        let side =
+            |per_tile: usize, more: usize| tiles.map(|count| count as usize * per_tile + more);
+        let settling = Settling {
+            fitted,
+            parent: self.cages.last().filter(|_| !is_key(level)),
+            step: scale.step_at(rise.grid.level_count() - 1 - level),
+            samples: rise.plane("settled", level, side(TILE_CELLS, 1))?,
+            cage: ControlPlane::create(
+                rise.scratch,
+                &format!("cage-{level}"),
+                side(TILE_QUADS, 3),
+            )?,
         };
-        let finest = count(grid.level_count() - 1);
-        let all: u64 = (0..grid.level_count()).map(count).sum();
-        // Samples and cages of all levels; while the finest is fitted, its rows' coefficients and the result, twice.
-        4 * (all + all / 15) + 4 * (finest / 2 + finest / 2)
+        let blocks = Blocks::new(settling.samples.size(), rise.side);
+        let block = |index| {
+            let widths = settling.block(&blocks.area(index))?;
+            advance(widths.tiles)?;
+            Ok(widths)
+        };
+        let widths = in_order(blocks.count(), block, Widths::join)?;
+        self.levels.push(Level {
+            tiles,
+            step: settling.step,
+            key: is_key(level),
+            cage_bytes: widths.cage,
+            detail_bytes: widths.detail,
+            voids: widths.voids,
+        });
+        self.samples.push(settling.samples);
+        self.cages.push(settling.cage);
+        Ok(())
+    }
+}
+
+/// The way up: samples of all levels, fitted.
+struct Rise<'a> {
+    grid: Grid,
+    scratch: &'a Path,
+    /// Samples a side of a block.
+    side: usize,
+}
+
+impl Rise<'_> {
+    fn plane(&self, what: &str, level: u8, size: [usize; 2]) -> Result<SamplePlane, PyramidError> {
+        SamplePlane::create(self.scratch, &format!("{what}-{level}"), size)
     }
 
-    /// The samples of all levels.
-    fn rise(
+    /// The finest samples: read, filled where void, continued past the data.
+    fn finest(
+        &self,
         raster: &dyn Raster,
-        grid: &Grid,
         scale: &Scale,
+        shape: &Shape,
         watch: &Watch<'_>,
-    ) -> Result<Vec<LevelSamples>, PyramidError> {
-        let advance = watch.stage(Stage::Read, u64::from(grid.rows));
-        let mut finest = sample::read_finest(raster, scale.unit(), &advance)?;
-        let data = [grid.rows, grid.columns].map(|count| count as usize);
-        voids::fill(&mut finest, data)?;
-        finest.continue_past(data);
-        let advance = watch.stage(Stage::Fit, 2 * u64::from(grid.level_count()));
-        advance(1)?;
-        let mut samples = vec![finest];
-        for level in (0..grid.level_count() - 1).rev() {
-            let mut coarse = LevelSamples::new(grid, level);
-            if let Some(fine) = samples.last() {
-                let fitted = fit::coarsen(fine, &mut coarse);
-                coarse.voids = fine.coarser_voids(&coarse);
-                coarse.continue_past(fitted);
-            }
-            samples.push(coarse);
-            advance(1)?;
+        void_count: &mut u64,
+    ) -> Result<SamplePlane, PyramidError> {
+        let grid = &self.grid;
+        let level = grid.level_count() - 1;
+        let plane = self.plane("fitted", level, plane_size(grid, level))?;
+        let [rows, columns] = [grid.rows, grid.columns];
+        let total = u64::from(rows) * u64::from(columns);
+        let advance = watch.stage(Stage::Read, total);
+        *void_count = read_finest(raster, scale.unit(), &plane, shape.window_samples, &advance)?;
+        if *void_count == total {
+            return Err(PyramidError::Refused(format!(
+                "all {rows} x {columns} samples are void: there is no terrain"
+            )));
         }
-        samples.reverse();
-        Ok(samples)
+        let data = [rows, columns].map(|count| count as usize);
+        if *void_count > 0 {
+            voids::fill(&plane, data, self.scratch, self.side)?;
+        }
+        self.continue_finest(&plane, data)?;
+        Ok(plane)
     }
 
-    /// Fits and quantises the cages of all levels.
-    fn fit(
-        samples: Vec<LevelSamples>,
-        grid: &Grid,
-        scale: &Scale,
+    fn continue_finest(&self, plane: &SamplePlane, data: [usize; 2]) -> Result<(), PyramidError> {
+        let size = plane.size();
+        let east = Area::new(0..data[0], data[1]..size[1]);
+        let south = Area::new(data[0]..size[0], 0..size[1]);
+        let blocks = Blocks::new(size, self.side);
+        let block = |index| {
+            for part in [&east, &south].map(|beyond| blocks.area(index).and(beyond)) {
+                if !part.is_empty() {
+                    let samples = continued(&part, data, size, |area| plane.read(area))?;
+                    plane.write(&part, &samples)?;
+                }
+            }
+            Ok(())
+        };
+        in_order(blocks.count(), block, |(), ()| ())
+    }
+
+    /// The samples of all levels, coarsest first, from the finest's.
+    fn coarser(
+        &self,
+        finest: SamplePlane,
         watch: &Watch<'_>,
-    ) -> Result<Self, PyramidError> {
-        let advance = watch.stage(Stage::Encode, samples.len() as u64);
-        let (mut levels, mut cages) = (Vec::new(), Vec::<LevelCage>::new());
-        for (level, samples) in (0..).zip(&samples) {
-            let (tiles, key) = (grid.tiles(level), is_key(level));
-            let step = scale.step_at(grid.level_count() - 1 - level);
-            let mut cage = LevelCage::new(tiles, fit::cage(samples, tiles));
-            let parent = cages.last().filter(|_| !key);
-            let width = quantise(&mut cage, parent, step)?;
-            let cage_bytes = if key {
-                key_width(&cage, tiles, step)
-            } else {
-                width
-            };
-            let voids = samples.voids.is_some();
-            levels.push(Level {
-                tiles,
-                step,
-                key,
-                cage_bytes,
-                detail_bytes: 1,
-                voids,
-            });
-            cages.push(cage);
-            advance(1)?;
+    ) -> Result<Vec<SamplePlane>, PyramidError> {
+        let coarser = 0..self.grid.level_count() - 1;
+        let tiles = coarser.clone().map(|level| tile_count(&self.grid, level));
+        let advance = watch.stage(Stage::Fit, tiles.sum());
+        let mut planes = vec![finest];
+        for level in coarser.rev() {
+            let coarse = self.plane("fitted", level, plane_size(&self.grid, level))?;
+            if let Some(fine) = planes.last() {
+                self.coarsen(fine, &coarse)?;
+            }
+            planes.push(coarse);
+            advance(tile_count(&self.grid, level))?;
         }
-        Ok(Self {
-            levels,
-            samples,
-            cages,
+        planes.reverse();
+        Ok(planes)
+    }
+
+    /// Fits a coarser level to a finer one.
+    fn coarsen(&self, fine: &SamplePlane, coarse: &SamplePlane) -> Result<(), PyramidError> {
+        let fitted = fine.size().map(|samples| samples / 2 + 1);
+        let blocks = Blocks::new(coarse.size(), self.side / 2);
+        let block = |index| {
+            let area = blocks.area(index);
+            let samples = continued(&area, fitted, coarse.size(), |area| {
+                let below = fine.read_mirrored(&HATS.support(area))?;
+                let mut samples = Samples::new(area.clone(), HATS.fit(area, &below));
+                below.mark_coarser_voids(&mut samples);
+                Ok(samples)
+            })?;
+            coarse.write(&area, &samples)
+        };
+        in_order(blocks.count(), block, |(), ()| ())
+    }
+}
+
+/// A level on the way down.
+struct Settling<'a> {
+    fitted: &'a SamplePlane,
+    /// The coarser level's cage, as stored; none at a key level.
+    parent: Option<&'a ControlPlane>,
+    step: i32,
+    samples: SamplePlane,
+    cage: ControlPlane,
+}
+
+impl Settling<'_> {
+    /// Settles the tiles of a block of samples.
+    fn block(&self, own: &Area) -> Result<Widths, PyramidError> {
+        let cells = |count: i64| usize::try_from(count).unwrap_or(0) / TILE_CELLS;
+        let [rows, columns] = [&own.rows, &own.columns].map(|r| cells(r.start)..cells(r.end));
+        let tiles = [rows.len(), columns.len()];
+        // Controls are counted from lattice point −1: a tile's first from 32 times its row.
+        let quads =
+            |range: &std::ops::Range<usize>| range.start * TILE_QUADS..range.end * TILE_QUADS + 3;
+        let controls = Area::new(quads(&rows), quads(&columns));
+        let lattice = Area {
+            rows: controls.rows.start - 1..controls.rows.end - 1,
+            columns: controls.columns.start - 1..controls.columns.end - 1,
+        };
+        let fitted = self.fitted.read_mirrored(&SPLINES.support(&lattice))?;
+        let mut cage = Cage::new(controls.size()[1], SPLINES.fit(&lattice, &fitted));
+        let cells =
+            |range: &std::ops::Range<usize>| range.start * TILE_CELLS..range.end * TILE_CELLS + 1;
+        let fitted = fitted.crop(&Area::new(cells(&rows), cells(&columns)));
+        let mut widths = self.quantise(&mut cage, &controls, tiles)?;
+        let settled = self.settle(&fitted, &cage, tiles, &mut widths);
+        self.samples.write(own, &settled)?;
+        // The last tiles' controls past the tile are its own, others' the next block's.
+        let end = |own_end: i64, first: usize, all: usize| {
+            let end = usize::try_from(own_end).unwrap_or(0) / QUAD_SAMPLES;
+            first..if end + 3 == all { all } else { end }
+        };
+        let [all_rows, all_columns] = self.cage.size();
+        let owned = Area::new(
+            end(own.rows.end, rows.start * TILE_QUADS, all_rows),
+            end(own.columns.end, columns.start * TILE_QUADS, all_columns),
+        );
+        self.cage.write(&owned, &controls, cage.controls())?;
+        Ok(widths)
+    }
+
+    fn quantise(
+        &self,
+        cage: &mut Cage,
+        controls: &Area,
+        tiles: [usize; 2],
+    ) -> Result<Widths, PyramidError> {
+        let parent = self.parent.map(|plane| -> Result<_, PyramidError> {
+            let half = |range: &std::ops::Range<i64>| range.start / 2..(range.end + 3) / 2;
+            let above = Area {
+                rows: half(&controls.rows),
+                columns: half(&controls.columns),
+            };
+            Ok(Cage::new(above.size()[1], plane.read(&above)?))
+        });
+        let parent = parent.transpose()?;
+        let width = quantise(cage, parent.as_ref(), self.step)?;
+        let cage = match parent {
+            Some(_) => width,
+            None => key_width(cage, tiles, self.step),
+        };
+        Ok(Widths {
+            cage,
+            tiles: tiles.map(|count| count as u64).iter().product(),
+            ..Widths::default()
         })
     }
 
-    /// Replaces every level's samples by the heights a reader will decode, and finds how wide codes are.
-    ///
-    /// Encoding those again gives the same codes, so neither codes nor a second array are kept.
-    fn settle(&mut self, watch: &Watch<'_>) -> Result<(), PyramidError> {
-        let rows = self
-            .levels
-            .iter()
-            .map(|level| u64::from(level.tiles[0]))
-            .sum();
-        let advance = watch.stage(Stage::Encode, rows);
-        for ((level, samples), cage) in self
-            .levels
-            .iter_mut()
-            .zip(&mut self.samples)
-            .zip(&self.cages)
-        {
-            for row in 0..level.tiles[0] {
-                let settled: Vec<(Vec<i32>, u8)> = (0..level.tiles[1])
-                    .into_par_iter()
-                    .map(|column| {
-                        let controls = cage.tile([row, column]);
-                        let codes =
-                            encode_detail(&samples.tile([row, column]), &controls, level.step);
-                        let width = codes.iter().map(|code| number_bytes(*code)).max();
-                        (
-                            decode_heights(&controls, &codes, level.step),
-                            width.unwrap_or(1),
-                        )
-                    })
-                    .collect();
-                for (column, (heights, width)) in (0..).zip(settled) {
-                    samples.put_tile([row, column], &heights);
-                    level.detail_bytes = level.detail_bytes.max(width);
-                }
-                advance(1)?;
-            }
+    /// The heights a reader will decode.
+    fn settle(
+        &self,
+        fitted: &Samples,
+        cage: &Cage,
+        [rows, columns]: [usize; 2],
+        widths: &mut Widths,
+    ) -> Samples {
+        let mut settled = fitted.clone();
+        for place in (0..rows).flat_map(|row| (0..columns).map(move |column| [row, column])) {
+            let first = place.map(|index| index * TILE_CELLS);
+            let controls = cage.tile(place);
+            let codes = encode_detail(&fitted.tile(first), &controls, self.step);
+            let width = codes.iter().map(|code| number_bytes(*code)).max();
+            widths.detail = widths.detail.max(width.unwrap_or(1));
+            settled.put_tile(first, &decode_heights(&controls, &codes, self.step));
         }
-        Ok(())
+        widths.voids = settled.voids.is_some();
+        settled
     }
+}
+
+/// How wide the numbers of a level are, and whether it has voids.
+#[derive(Clone, Copy, Debug)]
+struct Widths {
+    cage: u8,
+    detail: u8,
+    voids: bool,
+    /// Tiles they are of.
+    tiles: u64,
+}
+
+impl Default for Widths {
+    fn default() -> Self {
+        Self {
+            cage: 1,
+            detail: 1,
+            voids: false,
+            tiles: 0,
+        }
+    }
+}
+
+impl Widths {
+    fn join(self, other: Self) -> Self {
+        Self {
+            cage: self.cage.max(other.cage),
+            detail: self.detail.max(other.detail),
+            voids: self.voids | other.voids,
+            tiles: self.tiles + other.tiles,
+        }
+    }
+}
+
+/// Tiles of a level.
+pub(super) fn tile_count(grid: &Grid, level: u8) -> u64 {
+    grid.tiles(level).map(u64::from).iter().product()
 }

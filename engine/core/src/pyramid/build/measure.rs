@@ -12,65 +12,62 @@
 //! Sides are powers of two and heights integers, so every value inside a triangle is exact in f64, and so are the
 //! errors. Every edge of a fan is cut for itself: the worst of all fans is the worst of all wedges.
 
-use rayon::prelude::*;
+use super::samples::Samples;
+use crate::geo::QUAD_SAMPLES;
 
-use super::samples::{BitGrid, LevelSamples};
-use crate::geo::{PATCH_COUNT, QUAD_SAMPLES, TILE_QUADS, TILE_SAMPLES};
-
-/// The finest samples as stored, as far as they are data.
+/// Finest samples as stored, as far as they are data: what errors are measured against. Of what reaches past them, the
+/// part that lies in them is measured.
 #[derive(Clone, Copy)]
 pub(super) struct Finest<'a> {
-    values: &'a [i32],
-    width: usize,
-    rows: usize,
-    columns: usize,
-    voids: Option<&'a BitGrid>,
+    samples: &'a Samples,
+    /// First row, first column, row past the last, column past the last.
+    ends: [usize; 4],
 }
 
 impl<'a> Finest<'a> {
-    /// The first rows and columns of the finest level.
-    pub(super) fn new(level: &'a LevelSamples, [rows, columns]: [usize; 2]) -> Self {
+    /// A rectangle of finest samples.
+    pub(super) fn new(samples: &'a Samples) -> Self {
+        let area = &samples.area;
+        let ends = [
+            area.rows.start,
+            area.columns.start,
+            area.rows.end,
+            area.columns.end,
+        ];
         Self {
-            values: &level.values,
-            width: level.columns,
-            rows,
-            columns,
-            voids: level.voids.as_ref(),
+            samples,
+            ends: ends.map(|end| usize::try_from(end).unwrap_or(0)),
         }
     }
 
     /// Least and greatest height that is not void.
     pub(super) fn range(&self) -> [i32; 2] {
-        let row_range = |row: usize| {
-            let line = &self.values[row * self.width..][..self.columns];
-            let data = line
-                .iter()
-                .enumerate()
-                .filter(|(column, _)| self.voids.is_none_or(|voids| !voids.get(row, *column)));
-            data.fold([i32::MAX, i32::MIN], |[min, max], (_, value)| {
+        let columns = self.samples.columns;
+        let values = self.samples.values.iter().enumerate();
+        values
+            .filter(|(at, _)| !self.samples.is_void(at / columns, at % columns))
+            .fold([i32::MAX, i32::MIN], |[min, max], (_, value)| {
                 [min.min(*value), max.max(*value)]
             })
-        };
-        let join = |a: [i32; 2], b: [i32; 2]| [a[0].min(b[0]), a[1].max(b[1])];
-        (0..self.rows)
-            .into_par_iter()
-            .map(row_range)
-            .reduce(|| [i32::MAX, i32::MIN], join)
     }
 
     /// The greatest distance of samples `first` … `last` of a row from the line that is `value` at `first`.
     fn span(&self, row: usize, first: usize, last: usize, value: f64, slope: f64) -> f64 {
-        let last = last.min(self.columns - 1);
-        if first > last {
+        let [first_row, first_column, _, end] = self.ends;
+        let [from, last] = [first.max(first_column), last.min(end - 1)];
+        if from > last {
             return 0.0;
         }
-        let line = &self.values[row * self.width + first..=row * self.width + last];
-        match self.voids {
-            Some(voids) if voids.any_in(row, first, last) => {
+        let value = value + slope * (from - first) as f64;
+        let [row, from, last] = [row - first_row, from - first_column, last - first_column];
+        let start = row * self.samples.columns;
+        let line = &self.samples.values[start + from..=start + last];
+        match &self.samples.voids {
+            Some(voids) if voids.any_in(row, from, last) => {
                 let data = line
                     .iter()
                     .enumerate()
-                    .filter(|(place, _)| !voids.get(row, first + place));
+                    .filter(|(place, _)| !voids.get(row, from + place));
                 data.fold(0.0, |worst: f64, (place, height)| {
                     worst.max(off(place, *height, value, slope))
                 })
@@ -84,7 +81,7 @@ impl<'a> Finest<'a> {
         let [nw, ne, sw, se] = cell.corners;
         let side = cell.side as f64;
         let mut worst = 0.0_f64;
-        for (y, row) in cell.rows(self.rows) {
+        for (y, row) in cell.rows(self.ends) {
             let down = y as f64 / side;
             let west = nw + (sw - nw) * down;
             let middle = nw + (se - nw) * down;
@@ -104,7 +101,7 @@ impl<'a> Finest<'a> {
         // North and south wedges: two lines a row when split.
         let ends = [(0, nw, ne), (2, sw, se)];
         // East and west wedges: the row is on one side of the middle or the other.
-        for (y, row) in cell.rows(self.rows) {
+        for (y, row) in cell.rows(self.ends) {
             let (edge, a, b) = ends[usize::from(y > half)];
             let inset = y.min(cell.side - y);
             let up = inset as f64 / h;
@@ -185,85 +182,36 @@ struct Cell {
 }
 
 impl Cell {
-    /// Rows of the cell that are data, counted from its north edge and absolutely.
-    fn rows(&self, row_count: usize) -> impl Iterator<Item = (usize, usize)> {
-        (0..=self.side)
-            .map(|y| (y, self.row + y))
-            .take_while(move |(_, row)| *row < row_count)
+    /// Rows of the cell that are measured, counted from its north edge and absolutely.
+    fn rows(&self, [first, _, end, _]: [usize; 4]) -> impl Iterator<Item = (usize, usize)> {
+        let rows = self.row.max(first)..(self.row + self.side + 1).min(end);
+        rows.map(|row| (row - self.row, row))
     }
 }
 
-/// The errors of a tile, in units.
-pub(super) struct TileErrors {
-    /// Greatest error of the tile's triangles at stride 1.
+/// The greatest errors of a patch, in units.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct PatchErrors {
+    /// Of its triangles at stride 1.
     pub(super) whole: f64,
-    /// Greatest errors of each patch at depths 0 and 1, plain or with any template.
-    pub(super) patches: Vec<[f64; 2]>,
+    /// At depth 0, plain or with any template.
+    pub(super) coarse: f64,
+    /// At depth 1, likewise.
+    pub(super) middle: f64,
 }
 
-/// Measures a tile: its 129 × 129 heights against the finest samples under it, which are `stride` to one of its own.
-pub(super) fn measure(
-    heights: &[i32],
-    first: [usize; 2],
-    stride: usize,
-    finest: &Finest<'_>,
-) -> TileErrors {
-    let grid = TileGrid {
-        heights,
-        first,
-        stride,
-    };
-    let measured: Vec<[f64; 3]> = (0..PATCH_COUNT)
-        .into_par_iter()
-        .with_min_len(TILE_QUADS)
-        .map(|patch| grid.measure_patch([patch / TILE_QUADS, patch % TILE_QUADS], finest))
-        .collect();
-    TileErrors {
-        whole: measured
-            .iter()
-            .fold(0.0, |worst, [whole, ..]| worst.max(*whole)),
-        patches: measured
-            .iter()
-            .map(|[_, coarse, middle]| [*coarse, *middle])
-            .collect(),
-    }
+/// Samples of a level over finest samples, which are `stride` to one of its own.
+pub(super) struct Drawn<'a> {
+    /// The level's own samples.
+    pub(super) samples: &'a Samples,
+    /// Finest samples from one to the next.
+    pub(super) stride: usize,
 }
 
-/// A tile's own samples over the finest ones.
-struct TileGrid<'a> {
-    heights: &'a [i32],
-    first: [usize; 2],
-    stride: usize,
-}
-
-impl TileGrid<'_> {
-    fn at(&self, row: usize, column: usize) -> f64 {
-        f64::from(self.heights[row * TILE_SAMPLES + column])
-    }
-
-    /// The cell whose north-west corner is an own sample, `side` own samples wide.
-    fn cell(&self, row: usize, column: usize, side: usize) -> Cell {
-        Cell {
-            row: self.first[0] + row * self.stride,
-            column: self.first[1] + column * self.stride,
-            side: side * self.stride,
-            corners: [
-                self.at(row, column),
-                self.at(row, column + side),
-                self.at(row + side, column),
-                self.at(row + side, column + side),
-            ],
-        }
-    }
-
-    /// Errors at stride 1, of depth 0 and of depth 1.
-    fn measure_patch(&self, patch: [usize; 2], finest: &Finest<'_>) -> [f64; 3] {
+impl Drawn<'_> {
+    /// Measures a patch, counted over the whole level.
+    pub(super) fn patch(&self, patch: [usize; 2], finest: &Finest<'_>) -> PatchErrors {
         let [row, column] = patch.map(|index| index * QUAD_SAMPLES);
-        if self.first[0] + row * self.stride >= finest.rows
-            || self.first[1] + column * self.stride >= finest.columns
-        {
-            return [0.0; 3];
-        }
         let mut whole = 0.0_f64;
         if self.stride > 1 {
             for index in 0..QUAD_SAMPLES * QUAD_SAMPLES {
@@ -277,7 +225,37 @@ impl TileGrid<'_> {
             let outer = [down == 0, across == 1, down == 1, across == 0];
             self.cell_error(row + 2 * down, column + 2 * across, 2, outer, finest)
         });
-        [whole, coarse, middle.fold(0.0, f64::max)]
+        PatchErrors {
+            whole,
+            coarse,
+            middle: middle.fold(0.0, f64::max),
+        }
+    }
+
+    /// The height of an own sample, by row and column of the whole level.
+    fn at(&self, row: usize, column: usize) -> f64 {
+        let area = &self.samples.area;
+        let offset = |place: usize, first: i64| place - usize::try_from(first).unwrap_or(0);
+        let [row, column] = [
+            offset(row, area.rows.start),
+            offset(column, area.columns.start),
+        ];
+        f64::from(self.samples.values[row * self.samples.columns + column])
+    }
+
+    /// The cell whose north-west corner is an own sample, `side` own samples wide.
+    fn cell(&self, row: usize, column: usize, side: usize) -> Cell {
+        Cell {
+            row: row * self.stride,
+            column: column * self.stride,
+            side: side * self.stride,
+            corners: [
+                self.at(row, column),
+                self.at(row, column + side),
+                self.at(row + side, column),
+                self.at(row + side, column + side),
+            ],
+        }
     }
 
     /// The error of a cell, plain or as a fan whose edges (north, east, south, west) may be split where `outer`.
@@ -310,44 +288,30 @@ impl TileGrid<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geo::{Grid, TILE_CELLS};
+    use crate::geo::{TILE_SAMPLE_COUNT, TILE_SAMPLES};
+    use crate::pyramid::build::area::Area;
     use crate::pyramid::templates::{cell_triangles, quarter_split};
 
-    /// A finest level of two tiles a side with rough ground, and a coarser tile of noise over it.
-    fn ground(side: u32, hole: bool) -> (LevelSamples, Vec<i32>) {
-        let grid = Grid {
-            columns: side,
-            rows: side,
-            origin: [0.0; 2],
-            step: [1.0, -1.0],
-        };
-        let mut level = LevelSamples::new(&grid, grid.level_count() - 1);
+    /// Finest samples of rough ground, as far as they are data, and a coarser tile of noise over them.
+    fn ground(side: usize, hole: bool) -> (Samples, Samples) {
         let mix =
             |index: usize| i32::try_from(index.wrapping_mul(2_654_435_761) >> 9 & 1023).unwrap();
-        level
-            .values
-            .iter_mut()
-            .enumerate()
-            .for_each(|(index, value)| *value = mix(index));
+        let mut finest = Samples::new(Area::whole([side; 2]), (0..side * side).map(mix).collect());
         if hole {
-            let width = level.columns;
-            (5..60).for_each(|row| level.values[row * width + 3..row * width + 40].fill(i32::MIN));
-            level.take_voids(i32::MIN);
+            (5..60).for_each(|row| (3..40).for_each(|column| finest.set_void(row, column)));
         }
-        let heights = (0..TILE_SAMPLES * TILE_SAMPLES)
-            .map(|index| mix(index * 31 + 7) / 2)
-            .collect();
-        (level, heights)
+        let heights = (0..TILE_SAMPLE_COUNT).map(|index| mix(index * 31 + 7) / 2);
+        let tile = Samples::new(Area::whole([TILE_SAMPLES; 2]), heights.collect());
+        (finest, tile)
     }
 
     /// The greatest error of a cell's triangles, sample by sample with barycentric coordinates.
     fn brute_cell(
-        grid: &TileGrid<'_>,
+        grid: &Drawn<'_>,
         at: [usize; 2],
         side: usize,
         split: u8,
-        level: &LevelSamples,
-        data: usize,
+        level: &Samples,
     ) -> f64 {
         let half = side / 2;
         let own = |point: u8| {
@@ -360,11 +324,7 @@ mod tests {
         let mut worst = 0.0_f64;
         for triangle in cell_triangles(split) {
             let corners = triangle.map(own).map(|[row, column]| {
-                let place = [
-                    grid.first[0] + row * grid.stride,
-                    grid.first[1] + column * grid.stride,
-                ]
-                .map(signed);
+                let place = [row * grid.stride, column * grid.stride].map(signed);
                 (place, grid.at(row, column))
             });
             let cross = |a: [i64; 2], b: [i64; 2], c: [i64; 2]| {
@@ -373,18 +333,15 @@ mod tests {
             let area = cross(corners[0].0, corners[1].0, corners[2].0);
             for y in 0..=side * grid.stride {
                 for x in 0..=side * grid.stride {
-                    let (row, column) = (
-                        grid.first[0] + at[0] * grid.stride + y,
-                        grid.first[1] + at[1] * grid.stride + x,
-                    );
+                    let (row, column) = (at[0] * grid.stride + y, at[1] * grid.stride + x);
                     let point = [row, column].map(signed);
                     let parts =
                         [1, 2, 0].map(|k| cross(point, corners[k].0, corners[(k + 1) % 3].0));
                     let outside = parts.iter().any(|part| part * area.signum() < 0);
                     if outside
-                        || row >= data
-                        || column >= data
-                        || level.voids.as_ref().is_some_and(|v| v.get(row, column))
+                        || row >= level.rows
+                        || column >= level.columns
+                        || level.is_void(row, column)
                     {
                         continue;
                     }
@@ -399,21 +356,17 @@ mod tests {
         worst
     }
 
-    fn check(side: u32, hole: bool, stride: usize, patches: &[[usize; 2]]) {
-        let (level, heights) = ground(side, hole);
-        let data = side as usize;
-        let finest = Finest::new(&level, [data; 2]);
-        let grid = TileGrid {
-            heights: &heights,
-            first: [0, 0],
+    fn check(side: usize, hole: bool, stride: usize, patches: &[[usize; 2]]) {
+        let (level, samples) = ground(side, hole);
+        let drawn = Drawn {
+            samples: &samples,
             stride,
         };
-        let measured = measure(&heights, [0, 0], stride, &finest);
         for patch in patches {
             let [row, column] = patch.map(|index| index * 4);
             let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
             let coarse = (0..16)
-                .map(|split| brute_cell(&grid, [row, column], 4, split, &level, data))
+                .map(|split| brute_cell(&drawn, [row, column], 4, split, &level))
                 .fold(0.0, f64::max);
             let middle = (0..16 * 4).map(|index| {
                 let (split, down, across) = (
@@ -421,20 +374,14 @@ mod tests {
                     usize::from(index / 2 % 2),
                     usize::from(index % 2),
                 );
-                brute_cell(
-                    &grid,
-                    [row + 2 * down, column + 2 * across],
-                    2,
-                    quarter_split(split, down, across),
-                    &level,
-                    data,
-                )
+                let at = [row + 2 * down, column + 2 * across];
+                brute_cell(&drawn, at, 2, quarter_split(split, down, across), &level)
             });
-            let [depth0, depth1] = measured.patches[patch[0] * 32 + patch[1]];
             let middle = middle.fold(0.0, f64::max);
+            let errors = drawn.patch(*patch, &Finest::new(&level));
             assert!(
-                near(depth0, coarse) && near(depth1, middle),
-                "{patch:?} {depth0} {coarse} {depth1} {middle}"
+                near(errors.coarse, coarse) && near(errors.middle, middle),
+                "{patch:?} {errors:?} {coarse} {middle}"
             );
         }
     }
@@ -451,21 +398,34 @@ mod tests {
     }
 
     #[test]
-    fn the_whole_tile_s_error_is_that_of_its_cells() {
-        let (level, heights) = ground(257, false);
-        let finest = Finest::new(&level, [257; 2]);
-        let grid = TileGrid {
-            heights: &heights,
-            first: [0, 0],
-            stride: 2,
+    fn a_patch_s_error_is_the_greatest_of_its_parts() {
+        let (level, samples) = ground(257, true);
+        let drawn = Drawn {
+            samples: &samples,
+            stride: 8,
         };
-        let mut worst = 0.0_f64;
-        for row in 0..TILE_CELLS {
-            for column in 0..TILE_CELLS {
-                worst = worst.max(finest.plain(&grid.cell(row, column, 1)));
+        for patch in [[0, 0], [3, 7], [5, 1]] {
+            let whole = drawn.patch(patch, &Finest::new(&level));
+            let mut joined = PatchErrors::default();
+            for quarter in 0..4 {
+                let range = |half: usize| if half == 0 { 0..118 } else { 117..257 };
+                let area = Area::new(range(quarter / 2), range(quarter % 2));
+                let part = drawn.patch(patch, &Finest::new(&level.crop(&area)));
+                joined.whole = joined.whole.max(part.whole);
+                joined.coarse = joined.coarse.max(part.coarse);
+                joined.middle = joined.middle.max(part.middle);
             }
+            assert_eq!(joined, whole);
         }
-        assert_eq!(measure(&heights, [0, 0], 2, &finest).whole, worst);
-        assert_eq!(measure(&heights, [0, 0], 1, &finest).whole, 0.0);
+    }
+
+    #[test]
+    fn a_tile_at_stride_1_is_without_error() {
+        let (level, _) = ground(129, false);
+        let drawn = Drawn {
+            samples: &level,
+            stride: 1,
+        };
+        assert_eq!(drawn.patch([3, 9], &Finest::new(&level)).whole, 0.0);
     }
 }

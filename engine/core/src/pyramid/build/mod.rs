@@ -1,24 +1,33 @@
 //! Builds a pyramid from a raster: up fitting samples, down quantising cages, up again measuring true errors, out.
 //!
 //! ```text
-//! sample ─▶ voids ─▶ fit (samples, cages) ─▶ quantise ─▶ levels::settle ─▶ measure ─▶ records ─▶ PyramidWriter
-//!                                                                          color ──────────────▶
+//! read ─▶ voids ─▶ fit (samples, cages) ─▶ quantise ─▶ levels::settle ─▶ errors ─▶ records ─▶ PyramidWriter
+//!                                                                       color ──────────────▶
 //! ```
 //!
-//! Everything that decides bytes is integers or a fixed order of float operations, so they do not depend on threads.
-//! Holds all levels in memory, each as one array. Knows rasters and tiles; knows no screen.
+//! Passes go over planes on the disk, block by block; what a block becomes is a function of the planes around it and not
+//! of how a plane is cut, in integers or a fixed order of float operations. So neither memory depends on the raster's
+//! size, nor bytes on memory or threads. Knows rasters and tiles; knows no screen.
 
+mod area;
+mod border;
 mod color;
+mod errors;
 mod features;
 mod fit;
+mod ground;
 mod levels;
 mod measure;
 mod options;
+mod passes;
+mod plan;
+mod planes;
 mod quantise;
+mod read;
 mod records;
-mod sample;
 mod samples;
 mod scale;
+mod scratch;
 #[cfg(test)]
 pub(crate) mod testing;
 #[cfg(test)]
@@ -31,19 +40,16 @@ use std::time::Instant;
 
 pub use options::{BuildOptions, BuildReport, Imagery, Progress, Stage};
 
+use self::errors::Errors;
 use self::features::Features;
 use self::levels::Levels;
-use self::measure::Finest;
 use self::options::Watch;
-use self::records::{measure_all, write_all};
+use self::plan::Shape;
+use self::records::Records;
 use self::scale::Scale;
 use super::{Metadata, PyramidError, PyramidWriter, ShardInfo};
 use crate::dem::Raster;
 use crate::geo::Grid;
-
-/// Bytes a thread needs for itself, and bytes that are needed whatever the raster.
-const THREAD_BYTES: u64 = 4 << 20;
-const FIXED_BYTES: u64 = 32 << 20;
 
 /// Builds a pyramid.
 ///
@@ -64,7 +70,7 @@ pub fn build(
     let start = Instant::now();
     let plan = Plan::new(raster, imagery, options)?;
     let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.threads.unwrap_or(0))
+        .num_threads(plan.shape.threads)
         .build()
         .map_err(|error| {
             PyramidError::Refused(format!("the threads could not be started: {error}"))
@@ -94,7 +100,7 @@ pub fn build(
 struct Plan {
     grid: Grid,
     scale: Scale,
-    memory_bytes: u64,
+    shape: Shape,
     fingerprint: String,
 }
 
@@ -107,19 +113,7 @@ impl Plan {
         let header = raster.header();
         let grid = header.grid;
         let scale = Scale::new(options.eps, options.unit, header.integer)?;
-        let memory_bytes = memory_bytes(&grid, imagery, options);
-        if let Some(budget) = options
-            .memory_budget
-            .filter(|budget| *budget < memory_bytes)
-        {
-            return Err(PyramidError::Refused(format!(
-                "building {} x {} samples takes about {} MiB of memory; the budget is {} MiB",
-                grid.rows,
-                grid.columns,
-                memory_bytes.div_ceil(1 << 20),
-                budget >> 20
-            )));
-        }
+        let shape = Shape::new(raster, imagery, options)?;
         let fingerprint = if options.sources.is_empty() {
             String::new()
         } else {
@@ -128,7 +122,7 @@ impl Plan {
         Ok(Self {
             grid,
             scale,
-            memory_bytes,
+            shape,
             fingerprint,
         })
     }
@@ -142,21 +136,26 @@ impl Plan {
         watch: &Watch<'_>,
     ) -> Result<(Metadata, Vec<ShardInfo>, BuildReport), PyramidError> {
         let (grid, unit) = (&self.grid, self.scale.unit());
-        let levels = Levels::new(raster, &self.scale, watch)?;
+        let scratch = writer.scratch();
+        scratch::clear(&scratch)?;
+        let levels = Levels::new(raster, &self.scale, &self.shape, &scratch, watch)?;
         let features = Features::new(&options.features, &levels, raster.header(), unit)?;
-        let measures = measure_all(&levels, grid, unit, &features, watch)?;
-        let mut shards = write_all(&levels, &measures, grid, writer, watch)?;
-        let finest = &levels.samples[levels.samples.len() - 1];
-        let data = [grid.rows, grid.columns].map(|count| count as usize);
-        let height_range = Finest::new(finest, data).range();
-        let root_error = f64::from(measures[0][0].summary.error);
-        let mut report = self.report(options, &shards, root_error);
-        report.void_samples = finest.void_count(data);
+        let errors = Errors::measure(&levels, grid, &scratch, watch)?;
+        let records = Records {
+            levels: &levels,
+            errors: &errors,
+            features: &features,
+            grid,
+            unit,
+        };
+        let (mut shards, root) = records.write(writer, &scratch, watch)?;
+        let height_range = errors.height_range;
+        let mut report = self.report(options, &shards, f64::from(root.error));
+        report.void_samples = levels.void_count;
         let feature_shards = features.write(grid, writer)?;
         report.features = features.count();
         report.feature_bytes = feature_shards.iter().map(|info| info.bytes).sum();
         shards.extend(feature_shards);
-        let levels = { levels }.levels;
         let color = imagery
             .map(|imagery| color::write(imagery, grid, writer, watch))
             .transpose()?
@@ -174,7 +173,7 @@ impl Plan {
             unit_exponent: self.scale.unit_exponent,
             eps: self.scale.eps,
             height_range,
-            levels,
+            levels: levels.levels,
             color,
             features: features.metadata(),
             sources: options.sources.clone(),
@@ -204,21 +203,10 @@ impl Plan {
             root_error,
             height_bytes: level_bytes.iter().sum(),
             level_bytes,
-            memory_bytes: self.memory_bytes,
+            memory_bytes: self.shape.memory_bytes,
             ..BuildReport::default()
         }
     }
-}
-
-/// The memory a build takes at its peak, in bytes.
-fn memory_bytes(grid: &Grid, imagery: Option<&Imagery<'_>>, options: &BuildOptions) -> u64 {
-    let threads = options.threads.unwrap_or_else(rayon::current_num_threads) as u64;
-    let imagery = imagery.map_or(0, |imagery| {
-        3 * imagery.image.rgb.len() as u64 + color::memory_bytes(imagery.image, grid)
-    });
-    // A thread reads 64 rows at a time.
-    let strip = 64 * 8 * u64::from(grid.columns);
-    FIXED_BYTES + threads * (THREAD_BYTES + strip) + Levels::memory_bytes(grid) + imagery
 }
 
 /// One line that says all that decides the bytes: an interrupted build of the same is gone on with.

@@ -23,7 +23,8 @@ pub struct BuildOptions {
     pub unit: Option<f64>,
     /// Threads; by default as many as the machine has cores. The bytes do not depend on it.
     pub threads: Option<usize>,
-    /// Memory the build may take, in bytes; refused beforehand where that is too little.
+    /// Memory the build may take, in bytes: blocks are cut to fit, on fewer threads where they must; refused beforehand
+    /// where that is too little. The bytes do not depend on it.
     pub memory_budget: Option<u64>,
     /// Zero of the heights, where the caller knows.
     pub vertical: VerticalReference,
@@ -80,7 +81,7 @@ impl Stage {
 pub struct Progress {
     /// What it is doing.
     pub stage: Stage,
-    /// How much of the stage is done: rows of samples, levels or tiles.
+    /// How much of the stage is done: samples, tiles, blocks or shards.
     pub done: u64,
     /// How much there is.
     pub total: u64,

@@ -1,7 +1,7 @@
-//! Cages: fitted as a whole, quantised from the coarsest level down, and only then cut into tiles, so that neighbours
-//! hold equal numbers.
-
-use rayon::prelude::*;
+//! Cages: fitted and quantised from the coarsest level down, block by block.
+//!
+//! A control depends on the samples around it and on the parent's controls, whichever block asks, so blocks and tiles
+//! that share controls hold equal numbers.
 
 use crate::geo::{CAGE_CONTROL_COUNT, CAGE_CONTROLS, TILE_QUADS};
 use crate::pyramid::surface::{CONTROL_LIMIT, encode_key_controls};
@@ -10,24 +10,32 @@ use crate::pyramid::{PyramidError, number_bytes};
 /// Every fourth level stores its controls whole.
 const KEY_PERIOD: u8 = 4;
 
-/// The cage of a whole level: lattice points −1 … 32 t + 1 each way, for t tiles.
+/// The cage of a block of tiles: the lattice points of r × c tiles and a ring of one, 32 r + 3 rows of them.
 #[derive(Clone, Debug)]
-pub(super) struct LevelCage {
+pub(super) struct Cage {
     columns: usize,
     controls: Vec<i32>,
 }
 
-impl LevelCage {
-    /// A cage of so many rows and columns of tiles.
-    pub(super) fn new(tiles: [u32; 2], controls: Vec<i32>) -> Self {
-        let [rows, columns] = tiles.map(|count| count as usize * TILE_QUADS + 3);
-        debug_assert_eq!(controls.len(), rows * columns);
+impl Cage {
+    /// Controls row by row, so many a row.
+    pub(super) fn new(columns: usize, controls: Vec<i32>) -> Self {
+        debug_assert_eq!(controls.len() % columns, 0);
         Self { columns, controls }
     }
 
-    /// The 35 × 35 controls of a tile.
-    pub(super) fn tile(&self, [row, column]: [u32; 2]) -> Vec<i32> {
-        let [first_row, first_column] = [row, column].map(|index| index as usize * TILE_QUADS);
+    /// All controls, row by row.
+    pub(super) fn controls(&self) -> &[i32] {
+        &self.controls
+    }
+
+    /// The 35 × 35 controls of a tile of the block, counted from its first.
+    pub(super) fn tile(&self, [row, column]: [usize; 2]) -> Vec<i32> {
+        self.window([row * TILE_QUADS, column * TILE_QUADS])
+    }
+
+    /// The 35 × 35 controls whose first is at a row and column of the block's.
+    pub(super) fn window(&self, [first_row, first_column]: [usize; 2]) -> Vec<i32> {
         let mut controls = Vec::with_capacity(CAGE_CONTROL_COUNT);
         for row in first_row..first_row + CAGE_CONTROLS {
             let start = row * self.columns + first_column;
@@ -36,13 +44,8 @@ impl LevelCage {
         controls
     }
 
-    /// The control of a lattice point, −1 … 32 t + 1 each way.
-    pub(super) fn control(&self, row: i64, column: i64) -> i32 {
-        let [row, column] = [row, column].map(|at| usize::try_from(at + 1).unwrap_or(0));
-        self.controls[row * self.columns + column]
-    }
-
-    /// What subdividing this cage once predicts at a row of the child level: Catmull-Clark on a lattice.
+    /// What subdividing this cage once predicts at a row of the cage of its north-west children: Catmull-Clark on a
+    /// lattice.
     fn predict_row(&self, row: usize, out: &mut [i32]) {
         let coarse = |tap: usize| &self.controls[(row / 2 + tap) * self.columns..][..self.columns];
         let sums: Vec<i64> = match row % 2 {
@@ -83,49 +86,39 @@ pub(super) fn is_key(level: u8) -> bool {
 /// # Errors
 /// [`PyramidError::Refused`] where a control leaves the range of the 32-bit rule.
 pub(super) fn quantise(
-    cage: &mut LevelCage,
-    parent: Option<&LevelCage>,
+    cage: &mut Cage,
+    parent: Option<&Cage>,
     step: i32,
 ) -> Result<u8, PyramidError> {
     let columns = cage.columns;
-    let lines = cage
-        .controls
-        .par_chunks_exact_mut(columns)
-        .enumerate()
-        .map(|(row, line)| {
-            let mut predicted = vec![0; columns];
-            if let Some(parent) = parent {
-                parent.predict_row(row, &mut predicted);
-            }
-            let (mut width, mut greatest) = (1, 0);
-            for (control, predicted) in line.iter_mut().zip(predicted) {
-                let code = nearest(*control - predicted, step);
-                *control = predicted + code * step;
-                let stored = if parent.is_some() { code } else { *control };
-                width = width.max(number_bytes(stored));
-                greatest = greatest.max(control.unsigned_abs());
-            }
-            (width, greatest)
-        });
-    let (width, control) = lines.reduce(|| (1, 0), |a, b| (a.0.max(b.0), a.1.max(b.1)));
-    if control >= CONTROL_LIMIT.unsigned_abs() {
+    let mut predicted = vec![0; columns];
+    let (mut width, mut greatest) = (1, 0);
+    for (row, line) in cage.controls.chunks_exact_mut(columns).enumerate() {
+        if let Some(parent) = parent {
+            parent.predict_row(row, &mut predicted);
+        }
+        for (control, predicted) in line.iter_mut().zip(&predicted) {
+            let code = nearest(*control - predicted, step);
+            *control = predicted + code * step;
+            let stored = if parent.is_some() { code } else { *control };
+            width = width.max(number_bytes(stored));
+            greatest = greatest.max(control.unsigned_abs());
+        }
+    }
+    if greatest >= CONTROL_LIMIT.unsigned_abs() {
         return Err(PyramidError::Refused(format!(
-            "a cage's control of {control} units is over the limit of 2^25; a greater error bound or unit allows it"
+            "a cage's control of {greatest} units is over the limit of 2^25; a greater error bound or unit allows it"
         )));
     }
     Ok(width)
 }
 
-/// How many bytes the widest stored number of a key level takes.
-pub(super) fn key_width(cage: &LevelCage, tiles: [u32; 2], step: i32) -> u8 {
-    let width = |row: u32, column: u32| {
-        let codes = encode_key_controls(&cage.tile([row, column]), step);
-        codes.into_iter().map(number_bytes).max().unwrap_or(1)
-    };
-    let row_width = |row| (0..tiles[1]).map(|column| width(row, column)).max();
-    (0..tiles[0])
-        .into_par_iter()
-        .filter_map(row_width)
+/// How many bytes the widest stored number of a key level's tiles takes.
+pub(super) fn key_width(cage: &Cage, [rows, columns]: [usize; 2], step: i32) -> u8 {
+    (0..rows)
+        .flat_map(|row| (0..columns).map(move |column| [row, column]))
+        .flat_map(|place| encode_key_controls(&cage.tile(place), step))
+        .map(number_bytes)
         .max()
         .unwrap_or(1)
 }
@@ -140,15 +133,13 @@ mod tests {
     use super::*;
     use crate::pyramid::surface::{child_window, decode_controls};
 
-    fn noise(tiles: [u32; 2], scale: i32) -> LevelCage {
-        let count = tiles
-            .map(|count| count as usize * TILE_QUADS + 3)
-            .iter()
-            .product::<usize>();
+    fn noise(tiles: [usize; 2], scale: i32) -> Cage {
+        let [rows, columns] = tiles.map(|count| count * TILE_QUADS + 3);
+        let count = rows * columns;
         let controls = (0..i32::try_from(count).unwrap())
             .map(|i| (i * 7919 % 4001 - 2000) * scale)
             .collect();
-        LevelCage::new(tiles, controls)
+        Cage::new(columns, controls)
     }
 
     #[test]
@@ -160,7 +151,7 @@ mod tests {
         quantise(&mut child, Some(&parent), 17).unwrap();
         for (row, column) in (0..3).flat_map(|row| (0..2).map(move |column| (row, column))) {
             let above = parent.tile([row / 2, column / 2]);
-            let quadrant = row % 2 * 2 + column % 2;
+            let quadrant = u32::try_from(row % 2 * 2 + column % 2).unwrap();
             let controls = child.tile([row, column]);
             let codes: Vec<i32> = controls
                 .iter()

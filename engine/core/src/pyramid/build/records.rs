@@ -1,121 +1,299 @@
-//! From settled levels to records: measured from the finest level up, then written shard by shard.
+//! From settled levels to records: summarised from the finest level up, and written shard by shard.
 
-use rayon::prelude::*;
+use std::collections::HashMap;
+use std::num::NonZero;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 
+use lru::LruCache;
+
+use super::area::Area;
+use super::errors::{Errors, ceil_f32};
 use super::features::Features;
 use super::levels::Levels;
-use super::measure::{Finest, TileErrors, measure};
+use super::measure::PatchErrors;
 use super::options::{Stage, Watch};
-use crate::geo::{Grid, TileId};
+use super::passes::in_order;
+use super::quantise::Cage;
+use super::samples::Samples;
+use super::scratch::Plane;
+use crate::geo::{Grid, PATCH_COUNT, TILE_CELLS, TILE_QUADS, TileId};
 use crate::pyramid::surface::{child_window, encode_detail, encode_key_controls};
 use crate::pyramid::{
-    NEVER, PyramidError, PyramidWriter, RecordLayout, RecordParts, ShardInfo, Summary,
-    patch_nibble, shard_count,
+    Level, NEVER, PyramidError, PyramidWriter, RecordLayout, RecordParts, SHARD_TILES, ShardInfo,
+    Summary, patch_nibble, shard_count,
 };
 
+/// Tiles a side of what is read at once.
+const GROUP: u32 = 4;
+/// Groups kept: twice what the writer compresses side by side.
+const GROUPS: NonZero<usize> = NonZero::new(8).unwrap();
+
+/// What the records of all levels are made from.
+pub(super) struct Records<'a> {
+    pub(super) levels: &'a Levels,
+    pub(super) errors: &'a Errors,
+    pub(super) features: &'a Features,
+    pub(super) grid: &'a Grid,
+    /// One height unit in metres.
+    pub(super) unit: f64,
+}
+
+impl Records<'_> {
+    /// Writes all shards, finest level first. Returns them, and the root's summary.
+    pub(super) fn write(
+        &self,
+        writer: &PyramidWriter,
+        scratch: &Path,
+        watch: &Watch<'_>,
+    ) -> Result<(Vec<ShardInfo>, Summary), PyramidError> {
+        let shards_of = |level: u8| {
+            let [rows, columns] = shard_count(self.grid.tiles(level));
+            (0..rows).flat_map(move |row| (0..columns).map(move |column| [row, column]))
+        };
+        let total = (0..self.grid.level_count())
+            .map(|level| shards_of(level).count() as u64)
+            .sum();
+        let advance = watch.stage(Stage::Write, total);
+        let mut infos = Vec::new();
+        let mut finer: Option<Plane<4>> = None;
+        for level in (0..self.grid.level_count()).rev() {
+            let size = self.grid.tiles(level).map(|count| count as usize);
+            let own = Plane::create(scratch, &format!("summary-{level}"), size)?;
+            for shard in shards_of(level) {
+                infos.push(self.write_shard(level, shard, writer, &own, finer.as_ref())?);
+                advance(1)?;
+            }
+            if let Some(finer) = finer.replace(own) {
+                finer.remove()?;
+            }
+        }
+        let root = match finer {
+            Some(plane) => from_bits(plane.read(&Area::whole([1, 1]))?[0]),
+            None => Summary::default(),
+        };
+        Ok((infos, root))
+    }
+
+    fn write_shard(
+        &self,
+        level: u8,
+        shard: [u32; 2],
+        writer: &PyramidWriter,
+        own: &Plane<4>,
+        finer: Option<&Plane<4>>,
+    ) -> Result<ShardInfo, PyramidError> {
+        let tiles = self.grid.tiles(level);
+        let groups: Vec<[u32; 2]> = groups_of(tiles, shard);
+        let measure = |index: usize| {
+            let group = self.group(level, groups[index])?;
+            group
+                .tiles(tiles)
+                .map(|tile| self.measure(&group, tile, finer))
+                .collect()
+        };
+        let join = |mut all: Vec<Measured>, mut more: Vec<Measured>| {
+            all.append(&mut more);
+            all
+        };
+        let measured = in_order(groups.len(), measure, join)?;
+        let first = shard.map(|index| (index * SHARD_TILES) as usize);
+        let area = Area::new(
+            first[0]..(first[0] + SHARD_TILES as usize).min(tiles[0] as usize),
+            first[1]..(first[1] + SHARD_TILES as usize).min(tiles[1] as usize),
+        );
+        let mut summaries = vec![[0; 4]; area.count()];
+        for tile in &measured {
+            let [row, column] = [tile.id.row, tile.id.column].map(|index| index as usize);
+            let at = (row - first[0]) * area.size()[1] + column - first[1];
+            summaries[at] = to_bits(&tile.summary);
+        }
+        own.write(&area, &area, &summaries)?;
+        let by_tile: HashMap<TileId, Measured> =
+            measured.into_iter().map(|tile| (tile.id, tile)).collect();
+        let about = &self.levels.levels[usize::from(level)];
+        let layout = RecordLayout::new(about);
+        let groups = Mutex::new(LruCache::new(GROUPS));
+        let record = |tile: TileId| {
+            let Some(measured) = by_tile.get(&tile) else {
+                return Ok(None);
+            };
+            let group = self.kept_group(&groups, tile)?;
+            Ok(Some(group.record(about, &layout, measured)))
+        };
+        writer.write_shard(level, &layout, tiles, shard, &record)
+    }
+
+    /// A tile's group, from the last used ones or read.
+    fn kept_group(
+        &self,
+        kept: &Mutex<LruCache<[u32; 2], Arc<Group>>>,
+        tile: TileId,
+    ) -> Result<Arc<Group>, PyramidError> {
+        let place = [tile.row, tile.column].map(|index| index / GROUP);
+        let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(group) = kept.get(&place) {
+            return Ok(group.clone());
+        }
+        let group = Arc::new(self.group(tile.level, place)?);
+        kept.put(place, group.clone());
+        Ok(group)
+    }
+
+    fn group(&self, level: u8, place: [u32; 2]) -> Result<Group, PyramidError> {
+        let index = usize::from(level);
+        let tiles = self.grid.tiles(level);
+        let ranges = [0, 1].map(|axis| {
+            let first = place[axis] * GROUP;
+            first as usize..(first + GROUP).min(tiles[axis]) as usize
+        });
+        let [rows, columns] = &ranges;
+        let window = |per_tile: usize, more: usize| {
+            let range = |tiles: &std::ops::Range<usize>| {
+                tiles.start * per_tile..tiles.end * per_tile + more
+            };
+            Area::new(range(rows), range(columns))
+        };
+        let cage = |level: usize, area: &Area| -> Result<Cage, PyramidError> {
+            Ok(Cage::new(
+                area.size()[1],
+                self.levels.cages[level].read(area)?,
+            ))
+        };
+        let parent = if self.levels.levels[index].key {
+            None
+        } else {
+            // Groups start at even tiles; of an odd number, the last parent is read whole.
+            let half = |tiles: &std::ops::Range<usize>| {
+                tiles.start / 2 * TILE_QUADS..tiles.end.div_ceil(2) * TILE_QUADS + 3
+            };
+            Some(cage(index - 1, &Area::new(half(rows), half(columns)))?)
+        };
+        Ok(Group {
+            level,
+            first: [rows.start, columns.start],
+            samples: self.levels.samples[index].read(&window(TILE_CELLS, 1))?,
+            cage: cage(index, &window(TILE_QUADS, 3))?,
+            parent,
+        })
+    }
+
+    fn measure(
+        &self,
+        group: &Group,
+        id: TileId,
+        finer: Option<&Plane<4>>,
+    ) -> Result<Measured, PyramidError> {
+        let children = child_summaries(id, finer)?;
+        let errors = self.errors.tile(id)?;
+        let patches = errors.as_deref().unwrap_or_default();
+        let whole = patches
+            .iter()
+            .fold(0.0, |worst: f64, patch| worst.max(patch.whole));
+        let heights = group.samples.tile(group.first_sample(id));
+        let (_, voids) = group.samples.tile_voids(group.first_sample(id));
+        let error = ceil_f32(whole * self.unit);
+        let mut summary = summarise(&heights, voids, error, &children);
+        self.features.add_to(&mut summary, id);
+        let base = summary.error.max(ceil_f32(self.unit));
+        Ok(Measured {
+            id,
+            summary,
+            children,
+            patch_codes: patch_codes(patches, base, self.unit),
+        })
+    }
+}
+
+/// The groups of a shard, row by row.
+fn groups_of(tiles: [u32; 2], shard: [u32; 2]) -> Vec<[u32; 2]> {
+    let range = |axis: usize| {
+        let first = shard[axis] * SHARD_TILES;
+        let end = (first + SHARD_TILES).min(tiles[axis]);
+        first / GROUP..end.div_ceil(GROUP)
+    };
+    range(0)
+        .flat_map(|row| range(1).map(move |column| [row, column]))
+        .collect()
+}
+
+/// Up to 4 × 4 tiles of a level, as stored.
+struct Group {
+    level: u8,
+    /// Row and column of the first tile.
+    first: [usize; 2],
+    samples: Samples,
+    cage: Cage,
+    /// The parents' controls; none at a key level.
+    parent: Option<Cage>,
+}
+
+impl Group {
+    fn tiles(&self, tiles: [u32; 2]) -> impl Iterator<Item = TileId> {
+        let first = self
+            .first
+            .map(|index| u32::try_from(index).unwrap_or(u32::MAX));
+        let [rows, columns] =
+            [0, 1].map(|axis| first[axis]..(first[axis] + GROUP).min(tiles[axis]));
+        let level = self.level;
+        rows.flat_map(move |row| {
+            columns
+                .clone()
+                .map(move |column| TileId::new(level, row, column))
+        })
+    }
+
+    fn place(&self, tile: TileId) -> [usize; 2] {
+        [
+            tile.row as usize - self.first[0],
+            tile.column as usize - self.first[1],
+        ]
+    }
+
+    fn first_sample(&self, tile: TileId) -> [usize; 2] {
+        self.place(tile).map(|index| index * TILE_CELLS)
+    }
+
+    /// The record of a tile.
+    fn record(&self, level: &Level, layout: &RecordLayout, measured: &Measured) -> Vec<u8> {
+        let id = measured.id;
+        let controls = self.cage.tile(self.place(id));
+        let heights = self.samples.tile(self.first_sample(id));
+        let detail = encode_detail(&heights, &controls, level.step);
+        let (voids, _) = self.samples.tile_voids(self.first_sample(id));
+        let cage = match &self.parent {
+            None => encode_key_controls(&controls, level.step),
+            Some(parent) => {
+                let above = self.place(id).map(|index| index / 2);
+                let predicted = child_window(&parent.tile(above), id.quadrant());
+                controls
+                    .iter()
+                    .zip(predicted)
+                    .map(|(control, predicted)| (control - predicted) / level.step)
+                    .collect()
+            }
+        };
+        layout.encode(&RecordParts {
+            id,
+            summary: measured.summary,
+            children: measured.children,
+            patch_codes: &measured.patch_codes,
+            voids: level.voids.then_some(voids.as_slice()),
+            cage: &cage,
+            detail: &detail,
+        })
+    }
+}
+
 /// What was measured of a tile.
-pub(super) struct Measured {
+struct Measured {
+    id: TileId,
     /// What it says of itself.
-    pub(super) summary: Summary,
+    summary: Summary,
+    /// What it says of its children.
+    children: [Summary; 4],
     /// Its patch error codes.
     patch_codes: Vec<u8>,
-}
-
-/// What was measured of every tile: by level, coarsest first, row by row.
-pub(super) type Measures = Vec<Vec<Measured>>;
-
-/// Measures all tiles, from the finest level up.
-pub(super) fn measure_all(
-    levels: &Levels,
-    grid: &Grid,
-    unit: f64,
-    features: &Features,
-    watch: &Watch<'_>,
-) -> Result<Measures, PyramidError> {
-    let tiles = levels
-        .levels
-        .iter()
-        .map(|level| tile_count(level.tiles))
-        .sum();
-    let advance = watch.stage(Stage::Measure, tiles);
-    let mut measures = Measures::new();
-    for level in (0..grid.level_count()).rev() {
-        let finer = measures.last();
-        let count = tile_count(grid.tiles(level));
-        let measured: Result<Vec<_>, PyramidError> = (0..count)
-            .into_par_iter()
-            .map(|index| {
-                let tile = tile_at(grid, level, index);
-                let children = child_summaries(grid, tile, finer);
-                let measured = measure_tile(levels, grid, tile, &children, unit, features);
-                advance(1)?;
-                Ok(measured)
-            })
-            .collect();
-        measures.push(measured?);
-    }
-    measures.reverse();
-    Ok(measures)
-}
-
-/// Writes all shards, finest level first.
-pub(super) fn write_all(
-    levels: &Levels,
-    measures: &Measures,
-    grid: &Grid,
-    writer: &PyramidWriter,
-    watch: &Watch<'_>,
-) -> Result<Vec<ShardInfo>, PyramidError> {
-    let shards_of = |level: u8| {
-        let [rows, columns] = shard_count(grid.tiles(level));
-        (0..rows).flat_map(move |row| (0..columns).map(move |column| [row, column]))
-    };
-    let total = (0..grid.level_count())
-        .map(|level| shards_of(level).count() as u64)
-        .sum();
-    let advance = watch.stage(Stage::Write, total);
-    let mut infos = Vec::new();
-    for level in (0..grid.level_count()).rev() {
-        let layout = RecordLayout::new(&levels.levels[usize::from(level)]);
-        for shard in shards_of(level) {
-            let record = |tile: TileId| Some(record(levels, measures, grid, &layout, tile));
-            infos.push(writer.write_shard(level, &layout, grid.tiles(level), shard, &record)?);
-            advance(1)?;
-        }
-    }
-    Ok(infos)
-}
-
-fn measure_tile(
-    levels: &Levels,
-    grid: &Grid,
-    tile: TileId,
-    children: &[Summary; 4],
-    unit: f64,
-    features: &Features,
-) -> Measured {
-    let place = [tile.row, tile.column];
-    let samples = &levels.samples[usize::from(tile.level)];
-    let heights = samples.tile(place);
-    let finest = Finest::new(
-        &levels.samples[levels.samples.len() - 1],
-        [grid.rows, grid.columns].map(|count| count as usize),
-    );
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "a sample's row and column, under 2^27"
-    )]
-    let first = grid.first_sample(tile).map(|first| first as usize);
-    let errors = measure(&heights, first, grid.stride(tile.level) as usize, &finest);
-    let voids = samples.tile_voids(place).map_or(0, |(_, count)| count);
-    let mut summary = summarise(&heights, voids, ceil_f32(errors.whole * unit), children);
-    features.add_to(&mut summary, tile);
-    let base = summary.error.max(ceil_f32(unit));
-    let patch_codes = patch_codes(&errors, tile, grid, base, unit);
-    Measured {
-        summary,
-        patch_codes,
-    }
 }
 
 /// A tile's summary from its own samples and its children's summaries.
@@ -147,91 +325,46 @@ fn summarise(heights: &[i32], voids: usize, error: f32, children: &[Summary; 4])
 
 /// A finest tile stores no patch errors: there they equal the stride errors of its own heights, which every reader
 /// computes and takes the lesser of, exactly and without a byte.
-fn patch_codes(errors: &TileErrors, tile: TileId, grid: &Grid, base: f32, unit: f64) -> Vec<u8> {
-    let finest = tile.level + 1 == grid.level_count();
-    let nibble = |error: f64| {
-        if finest {
-            NEVER
-        } else {
-            patch_nibble(error * unit, base)
-        }
-    };
-    errors
-        .patches
+fn patch_codes(patches: &[PatchErrors], base: f32, unit: f64) -> Vec<u8> {
+    if patches.is_empty() {
+        return vec![NEVER | NEVER << 4; PATCH_COUNT];
+    }
+    let nibble = |error: f64| patch_nibble(error * unit, base);
+    patches
         .iter()
-        .map(|[coarse, middle]| nibble(*coarse) | nibble(*middle) << 4)
+        .map(|patch| nibble(patch.coarse) | nibble(patch.middle) << 4)
         .collect()
 }
 
-/// The record of a tile.
-pub(super) fn record(
-    levels: &Levels,
-    measures: &Measures,
-    grid: &Grid,
-    layout: &RecordLayout,
-    tile: TileId,
-) -> Vec<u8> {
-    let index = usize::from(tile.level);
-    let (level, place) = (&levels.levels[index], [tile.row, tile.column]);
-    let controls = levels.cages[index].tile(place);
-    let detail = encode_detail(&levels.samples[index].tile(place), &controls, level.step);
-    let measured = &measures[index][index_of(grid, tile)];
-    let voids = levels.samples[index].tile_voids(place);
-    let cage = match tile.parent().filter(|_| !level.key) {
-        None => encode_key_controls(&controls, level.step),
-        Some(parent) => {
-            let above = levels.cages[usize::from(parent.level)].tile([parent.row, parent.column]);
-            let predicted = child_window(&above, tile.quadrant());
-            controls
-                .iter()
-                .zip(predicted)
-                .map(|(control, predicted)| (control - predicted) / level.step)
-                .collect()
-        }
-    };
-    layout.encode(&RecordParts {
-        id: tile,
-        summary: measured.summary,
-        children: child_summaries(grid, tile, measures.get(index + 1)),
-        patch_codes: &measured.patch_codes,
-        voids: voids.as_ref().map(|(bits, _)| bits.as_slice()),
-        cage: &cage,
-        detail: &detail,
-    })
-}
-
 /// The summaries of a tile's children, of which those the pyramid lacks are empty.
-fn child_summaries(grid: &Grid, tile: TileId, finer: Option<&Vec<Measured>>) -> [Summary; 4] {
-    tile.children().map(|child| match finer {
-        Some(measured) if grid.has(child) => measured[index_of(grid, child)].summary,
-        _ => Summary::default(),
-    })
+fn child_summaries(tile: TileId, finer: Option<&Plane<4>>) -> Result<[Summary; 4], PyramidError> {
+    let mut summaries = [Summary::default(); 4];
+    let Some(finer) = finer else {
+        return Ok(summaries);
+    };
+    let [row, column] = [tile.row, tile.column].map(|index| 2 * index as usize);
+    let area = Area::new(row..row + 2, column..column + 2).and(&Area::whole(finer.size()));
+    let [_, columns] = area.size();
+    for (at, bits) in finer.read(&area)?.into_iter().enumerate() {
+        summaries[at / columns * 2 + at % columns] = from_bits(bits);
+    }
+    Ok(summaries)
 }
 
-fn index_of(grid: &Grid, tile: TileId) -> usize {
-    tile.row as usize * grid.tiles(tile.level)[1] as usize + tile.column as usize
+fn to_bits(summary: &Summary) -> [i32; 4] {
+    [
+        summary.min,
+        summary.max,
+        summary.error.to_bits().cast_signed(),
+        summary.flags.cast_signed(),
+    ]
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "rows and columns of tiles are u32"
-)]
-fn tile_at(grid: &Grid, level: u8, index: u64) -> TileId {
-    let columns = u64::from(grid.tiles(level)[1]);
-    TileId::new(level, (index / columns) as u32, (index % columns) as u32)
-}
-
-fn tile_count([rows, columns]: [u32; 2]) -> u64 {
-    u64::from(rows) * u64::from(columns)
-}
-
-/// The least f32 that is no less.
-#[expect(clippy::cast_possible_truncation, reason = "corrected upwards")]
-pub(super) fn ceil_f32(value: f64) -> f32 {
-    let nearest = value as f32;
-    if f64::from(nearest) < value {
-        nearest.next_up()
-    } else {
-        nearest
+fn from_bits([min, max, error, flags]: [i32; 4]) -> Summary {
+    Summary {
+        min,
+        max,
+        error: f32::from_bits(error.cast_unsigned()),
+        flags: flags.cast_unsigned(),
     }
 }

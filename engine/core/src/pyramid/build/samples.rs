@@ -1,11 +1,7 @@
-//! The samples of one level while a pyramid is built: heights in units over whole tiles, and which of them are void.
-//!
-//! The array covers an even number of tiles each way (one on level 0), so that the next coarser level can be fitted to
-//! it without asking what lies beyond.
+//! A rectangle of a level's samples in memory: heights in units, and which of them are void.
 
-use rayon::prelude::*;
-
-use crate::geo::{Grid, TILE_CELLS, TILE_SAMPLE_COUNT, TILE_SAMPLES};
+use super::area::Area;
+use crate::geo::{TILE_CELLS, TILE_SAMPLE_COUNT, TILE_SAMPLES};
 
 /// Bits in rows, for void samples.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,12 +48,14 @@ impl BitGrid {
     }
 }
 
-/// The samples of one level.
-#[derive(Clone, Debug)]
-pub(super) struct LevelSamples {
-    /// Rows of samples in the array.
+/// A rectangle of samples.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Samples {
+    /// Where on the level it lies.
+    pub(super) area: Area,
+    /// Rows of samples.
     pub(super) rows: usize,
-    /// Columns of samples in the array.
+    /// Columns of samples.
     pub(super) columns: usize,
     /// Heights in units, row by row.
     pub(super) values: Vec<i32>,
@@ -65,21 +63,22 @@ pub(super) struct LevelSamples {
     pub(super) voids: Option<BitGrid>,
 }
 
-impl LevelSamples {
-    /// Zero heights for a level of a grid.
-    pub(super) fn new(grid: &Grid, level: u8) -> Self {
-        let [rows, columns] = array_size(grid, level);
+impl Samples {
+    /// Heights row by row, none of them void.
+    pub(super) fn new(area: Area, values: Vec<i32>) -> Self {
+        let [rows, columns] = area.size();
+        debug_assert_eq!(values.len(), rows * columns);
         Self {
+            area,
             rows,
             columns,
-            values: vec![0; rows * columns],
+            values,
             voids: None,
         }
     }
 
-    /// Heights of a tile, 129 × 129.
-    pub(super) fn tile(&self, [row, column]: [u32; 2]) -> Vec<i32> {
-        let [first_row, first_column] = [row, column].map(|index| index as usize * TILE_CELLS);
+    /// Heights of a tile, 129 × 129, whose first sample is at a row and column of the rectangle.
+    pub(super) fn tile(&self, [first_row, first_column]: [usize; 2]) -> Vec<i32> {
         let mut heights = Vec::with_capacity(TILE_SAMPLE_COUNT);
         for row in first_row..first_row + TILE_SAMPLES {
             let start = row * self.columns + first_column;
@@ -88,181 +87,102 @@ impl LevelSamples {
         heights
     }
 
-    /// Puts a tile's heights into the array.
-    pub(super) fn put_tile(&mut self, [row, column]: [u32; 2], heights: &[i32]) {
-        let [first_row, first_column] = [row, column].map(|index| index as usize * TILE_CELLS);
+    /// Puts a tile's heights where [`Self::tile`] takes them.
+    pub(super) fn put_tile(&mut self, [first_row, first_column]: [usize; 2], heights: &[i32]) {
         for (line, heights) in heights.chunks_exact(TILE_SAMPLES).enumerate() {
             let start = (first_row + line) * self.columns + first_column;
             self.values[start..start + TILE_SAMPLES].copy_from_slice(heights);
         }
     }
 
-    /// Void bits of a tile as a record has them, and how many are set; none where the level has no voids.
-    pub(super) fn tile_voids(&self, [row, column]: [u32; 2]) -> Option<(Vec<u8>, usize)> {
-        let voids = self.voids.as_ref()?;
-        let [first_row, first_column] = [row, column].map(|index| index as usize * TILE_CELLS);
+    /// Void bits of a tile as a record has them, and how many are set.
+    pub(super) fn tile_voids(&self, [first_row, first_column]: [usize; 2]) -> (Vec<u8>, usize) {
         let mut bits = vec![0_u8; TILE_SAMPLE_COUNT.div_ceil(8)];
         let mut count = 0;
-        for index in 0..TILE_SAMPLE_COUNT {
-            if voids.get(
-                first_row + index / TILE_SAMPLES,
-                first_column + index % TILE_SAMPLES,
-            ) {
-                bits[index / 8] |= 1 << (index % 8);
-                count += 1;
+        let Some(voids) = &self.voids else {
+            return (bits, count);
+        };
+        for row in 0..TILE_SAMPLES {
+            let [first, last] = [first_column, first_column + TILE_CELLS];
+            if !voids.any_in(first_row + row, first, last) {
+                continue;
             }
-        }
-        Some((bits, count))
-    }
-
-    /// Continues heights and voids past the first rows and columns to the whole array.
-    ///
-    /// Heights run on with a slope that fades, and are smoothed along the border, the more the farther out: noise
-    /// must not make ridges.
-    pub(super) fn continue_past(&mut self, [rows, columns]: [usize; 2]) {
-        let width = self.columns;
-        for column in columns..width {
-            continue_column(
-                &mut self.values[..rows * width],
-                width,
-                column,
-                column - columns,
-            );
-        }
-        for row in rows..self.rows {
-            let (done, rest) = self.values.split_at_mut(row * width);
-            let last = &done[(row - 1) * width..];
-            let before = &done[row.saturating_sub(2) * width..][..width];
-            let line = continued(
-                row - rows,
-                width,
-                |place| last[place],
-                |place| before[place],
-            );
-            rest[..width].copy_from_slice(&line);
-        }
-        if let Some(voids) = &mut self.voids {
-            continue_voids(voids, [rows, columns], [self.rows, self.columns]);
-        }
-    }
-
-    /// The void mask of the next coarser level: a sample is void when all samples under its hat are.
-    pub(super) fn coarser_voids(&self, coarse: &Self) -> Option<BitGrid> {
-        let voids = self.voids.as_ref()?;
-        let mut bits = BitGrid::new(coarse.rows, coarse.columns);
-        let mut any = false;
-        for row in 0..self.rows.div_ceil(2) {
-            for column in 0..self.columns.div_ceil(2) {
-                if hat(row, self.rows).all(|r| hat(column, self.columns).all(|c| voids.get(r, c))) {
-                    bits.set(row, column);
-                    any = true;
+            for column in 0..TILE_SAMPLES {
+                if voids.get(first_row + row, first_column + column) {
+                    let index = row * TILE_SAMPLES + column;
+                    bits[index / 8] |= 1 << (index % 8);
+                    count += 1;
                 }
             }
         }
-        any.then_some(bits)
+        (bits, count)
     }
 
-    /// How many of the first rows' and columns' samples are void.
-    pub(super) fn void_count(&self, [rows, columns]: [usize; 2]) -> u64 {
-        let Some(voids) = &self.voids else { return 0 };
-        (0..rows)
-            .map(|row| {
-                (0..columns)
-                    .filter(|column| voids.get(row, *column))
-                    .count() as u64
-            })
-            .sum()
+    /// Marks a sample void.
+    pub(super) fn set_void(&mut self, row: usize, column: usize) {
+        self.voids
+            .get_or_insert_with(|| BitGrid::new(self.rows, self.columns))
+            .set(row, column);
     }
 
-    /// Remembers which samples hold `sentinel` as void and makes them 0.
-    pub(super) fn take_voids(&mut self, sentinel: i32) {
-        if self.values.par_iter().all(|value| *value != sentinel) {
-            return;
-        }
-        let mut voids = BitGrid::new(self.rows, self.columns);
-        for (row, line) in self.values.chunks_exact_mut(self.columns).enumerate() {
-            for (column, value) in line
-                .iter_mut()
-                .enumerate()
-                .filter(|(_, value)| **value == sentinel)
-            {
-                voids.set(row, column);
-                *value = 0;
+    /// True for a void sample.
+    pub(super) fn is_void(&self, row: usize, column: usize) -> bool {
+        self.voids
+            .as_ref()
+            .is_some_and(|voids| voids.get(row, column))
+    }
+
+    /// A part of the rectangle.
+    pub(super) fn crop(&self, area: &Area) -> Self {
+        let [first_row, first_column] = self.area.offset_of(area);
+        let [rows, columns] = area.size();
+        let line = |row: usize| {
+            let start = (first_row + row) * self.columns + first_column;
+            &self.values[start..start + columns]
+        };
+        let values = (0..rows)
+            .flat_map(|row| line(row).iter().copied())
+            .collect();
+        let mut part = Self::new(area.clone(), values);
+        if self.voids.is_some() {
+            for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |c| (row, c))) {
+                if self.is_void(first_row + row, first_column + column) {
+                    part.set_void(row, column);
+                }
             }
         }
-        self.voids = Some(voids);
+        part
     }
-}
 
-/// Rows and columns of a level's array: whole tiles, an even number of them unless the level is the coarsest.
-pub(super) fn array_size(grid: &Grid, level: u8) -> [usize; 2] {
-    let even = |count: u32| {
-        if level == 0 {
-            count
-        } else {
-            count.next_multiple_of(2)
+    /// Copies another rectangle that lies in this one.
+    pub(super) fn put(&mut self, part: &Self) {
+        let [first_row, first_column] = self.area.offset_of(&part.area);
+        for row in 0..part.rows {
+            let start = (first_row + row) * self.columns + first_column;
+            let line = &part.values[row * part.columns..][..part.columns];
+            self.values[start..start + part.columns].copy_from_slice(line);
+            for column in (0..part.columns).filter(|column| part.is_void(row, *column)) {
+                self.set_void(first_row + row, first_column + column);
+            }
         }
-    };
-    grid.tiles(level)
-        .map(|count| even(count) as usize * TILE_CELLS + 1)
-}
-
-/// The finer samples under a coarser sample's hat.
-fn hat(coarse: usize, finer_count: usize) -> impl Iterator<Item = usize> {
-    (2 * coarse).saturating_sub(1)..(2 * coarse + 2).min(finer_count)
-}
-
-/// One more column past the border.
-fn continue_column(values: &mut [i32], width: usize, column: usize, distance: usize) {
-    let rows = values.len() / width;
-    let before = column.saturating_sub(2);
-    let line = continued(
-        distance,
-        rows,
-        |row| values[row * width + column - 1],
-        |row| values[row * width + before],
-    );
-    for (row, height) in line.into_iter().enumerate() {
-        values[row * width + column] = height;
     }
-}
 
-/// One more line past the border: the last one smoothed along itself, plus half its smoothed slope.
-fn continued(
-    distance: usize,
-    len: usize,
-    last: impl Fn(usize) -> i32,
-    before: impl Fn(usize) -> i32,
-) -> Vec<i32> {
-    // Whole units: past some lines the slope is rounding and no more.
-    let slope = |place: usize| {
-        if distance < 8 {
-            (last(place) - before(place)) / 2
-        } else {
-            0
+    /// The void marks of a coarser level's samples: void where all samples under their hat are.
+    ///
+    /// `coarse` is to be zeros; this rectangle reaches at least a sample past all its hats.
+    pub(super) fn mark_coarser_voids(&self, coarse: &mut Self) {
+        if self.voids.is_none() {
+            return;
         }
-    };
-    let around = |place: usize| [place.saturating_sub(1), place, (place + 1).min(len - 1)];
-    (0..len)
-        .map(|place| weigh(around(place).map(&last)) + weigh(around(place).map(slope)))
-        .collect()
-}
-
-/// (1, 2, 1) / 4, rounded.
-fn weigh([a, b, c]: [i32; 3]) -> i32 {
-    (a + 2 * b + c + 2) >> 2
-}
-
-fn continue_voids(
-    voids: &mut BitGrid,
-    [rows, columns]: [usize; 2],
-    [all_rows, all_columns]: [usize; 2],
-) {
-    for row in 0..all_rows {
-        let first = if row < rows { columns } else { 0 };
-        for column in first..all_columns {
-            if voids.get(row.min(rows - 1), column.min(columns - 1)) {
-                voids.set(row, column);
+        let place = |coarse: i64, first: i64| usize::try_from(2 * coarse - first).unwrap_or(0);
+        for (row, at) in coarse.area.rows.clone().enumerate() {
+            let fine_row = place(at, self.area.rows.start);
+            for (column, at) in coarse.area.columns.clone().enumerate() {
+                let fine_column = place(at, self.area.columns.start);
+                let hat = |fine: usize| fine - 1..=fine + 1;
+                if hat(fine_row).all(|r| hat(fine_column).all(|c| self.is_void(r, c))) {
+                    coarse.set_void(row, column);
+                }
             }
         }
     }
@@ -272,61 +192,41 @@ fn continue_voids(
 mod tests {
     use super::*;
 
-    fn grid(rows: u32, columns: u32) -> Grid {
-        Grid {
-            columns,
-            rows,
-            origin: [0.0, 0.0],
-            step: [1.0, -1.0],
-        }
+    fn rough(area: Area) -> Samples {
+        let count = i32::try_from(area.count()).unwrap();
+        Samples::new(area, (0..count).map(|at| at * 7919 % 1001).collect())
     }
 
     #[test]
-    fn arrays_cover_an_even_number_of_tiles_except_at_the_root() {
-        let grid = grid(1201, 300);
-        assert_eq!(array_size(&grid, 4), [1281, 513]);
-        assert_eq!(array_size(&grid, 3), [769, 257]);
-        assert_eq!(array_size(&grid, 0), [129, 129]);
+    fn parts_put_back_make_the_whole() {
+        let mut whole = rough(Area::new(10..30, 5..200));
+        whole.set_void(3, 70);
+        let mut again = Samples::new(whole.area.clone(), vec![0; whole.values.len()]);
+        for area in [
+            Area::new(10..14, 5..200),
+            Area::new(14..30, 5..70),
+            Area::new(14..30, 70..200),
+        ] {
+            again.put(&whole.crop(&area));
+        }
+        assert_eq!(again, whole);
     }
 
     #[test]
-    fn a_plane_runs_on_without_a_step() {
-        let mut level = LevelSamples::new(&grid(200, 200), 1);
-        for row in 0..200 {
-            for column in 0..200 {
-                level.values[row * level.columns + column] =
-                    16 * i32::try_from(row + column).unwrap();
-            }
-        }
-        level.continue_past([200, 200]);
-        for row in 0..level.rows - 1 {
-            for column in 0..level.columns - 1 {
-                let at = row * level.columns + column;
-                assert!((level.values[at + 1] - level.values[at]).abs() <= 17);
-                assert!((level.values[at + level.columns] - level.values[at]).abs() <= 17);
-            }
-        }
-    }
-
-    #[test]
-    fn one_sample_runs_on_as_flat_ground() {
-        let mut level = LevelSamples::new(&grid(1, 1), 0);
-        level.values[0] = 77;
-        level.continue_past([1, 1]);
-        assert!(level.values.iter().all(|height| *height == 77));
+    fn a_tile_goes_out_and_in() {
+        let whole = rough(Area::new(0..140, 0..300));
+        let mut again = Samples::new(whole.area.clone(), vec![0; whole.values.len()]);
+        again.put_tile([3, 100], &whole.tile([3, 100]));
+        assert_eq!(again.tile([3, 100]), whole.tile([3, 100]));
+        assert_eq!(again.values[2 * 300 + 100], 0);
     }
 
     #[test]
     fn a_coarser_sample_is_void_only_when_all_under_its_hat_are() {
-        let grid = grid(257, 257);
-        let mut fine = LevelSamples::new(&grid, 1);
-        for row in 3..=5 {
-            for column in 3..=6 {
-                fine.values[row * fine.columns + column] = i32::MIN;
-            }
-        }
-        fine.take_voids(i32::MIN);
-        let coarse = fine.coarser_voids(&LevelSamples::new(&grid, 0)).unwrap();
-        assert!(coarse.get(2, 2) && coarse.count() == 1);
+        let mut fine = rough(Area::new(0..20, 0..20));
+        (3..=5).for_each(|row| (3..=6).for_each(|column| fine.set_void(row, column)));
+        let mut coarse = Samples::new(Area::new(1..9, 1..9), vec![0; 64]);
+        fine.mark_coarser_voids(&mut coarse);
+        assert!(coarse.is_void(1, 1) && coarse.voids.unwrap().count() == 1);
     }
 }

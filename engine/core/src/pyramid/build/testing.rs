@@ -57,6 +57,10 @@ impl Raster for Field {
         }
         Ok(())
     }
+
+    fn memory_bytes(&self) -> u64 {
+        8 * self.heights.len() as u64
+    }
 }
 
 /// Rough hills: whole metres.

@@ -4,80 +4,81 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use super::area::Area;
+use super::measure::{Drawn, Finest};
+use super::samples::Samples;
 use super::testing::{Field, hills, shared};
 use super::*;
 use crate::dem::{self, OpenOptions, Window};
 use crate::geo::{PATCH_COUNT, TILE_SAMPLES, TileId};
-use crate::pyramid::surface::{decode_controls, decode_heights, decode_key_controls};
-use crate::pyramid::{Record, RecordLayout, Summary, patch_error};
+use crate::pyramid::surface::decode_heights;
+use crate::pyramid::{Pyramid, Summary, Tile, patch_error};
 
-/// A built pyramid in memory: every record, and heights decoded as a reader does, from records alone.
+/// A built pyramid, opened and read tile by tile.
 struct Built {
-    plan: Plan,
-    levels: Levels,
-    records: BTreeMap<TileId, Record>,
+    _folder: tempfile::TempDir,
+    metadata: Metadata,
+    tiles: BTreeMap<TileId, Tile>,
 }
 
 impl Built {
-    fn new(raster: &dyn Raster, eps: Option<f64>) -> Result<Self, PyramidError> {
+    fn new(raster: &dyn Raster, eps: Option<f64>) -> Self {
+        let folder = tempfile::tempdir().unwrap();
         let options = BuildOptions {
+            output: folder.path().join("out"),
             eps,
             ..BuildOptions::default()
         };
-        let plan = Plan::new(raster, None, &options)?;
-        let cancel = AtomicBool::new(false);
-        let watch = Watch::new(&|_| (), &cancel);
-        let levels = Levels::new(raster, &plan.scale, &watch)?;
-        let features = Features::new(&[], &levels, raster.header(), plan.scale.unit())?;
-        let measures = measure_all(&levels, &plan.grid, plan.scale.unit(), &features, &watch)?;
-        let mut records = BTreeMap::new();
-        for (level, about) in (0..).zip(&levels.levels) {
-            let layout = RecordLayout::new(about);
-            for (row, column) in (0..about.tiles[0])
-                .flat_map(|row| (0..about.tiles[1]).map(move |column| (row, column)))
-            {
-                let tile = TileId::new(level, row, column);
-                let bytes = records::record(&levels, &measures, &plan.grid, &layout, tile);
-                records.insert(tile, layout.decode(&bytes).unwrap());
-            }
-        }
-        Ok(Self {
-            plan,
-            levels,
-            records,
-        })
-    }
-
-    fn controls(&self, tile: TileId) -> Vec<i32> {
-        let level = &self.levels.levels[usize::from(tile.level)];
-        let cage = &self.records[&tile].cage;
-        match tile.parent().filter(|_| !level.key) {
-            None => decode_key_controls(cage, level.step),
-            Some(parent) => {
-                decode_controls(&self.controls(parent), tile.quadrant(), cage, level.step)
-            }
+        run(raster, &options).unwrap();
+        let pyramid = Pyramid::open(&options.output).unwrap();
+        let metadata = pyramid.metadata().clone();
+        let grid = &metadata.grid;
+        let tiles = (0..grid.level_count()).flat_map(|level| {
+            let [rows, columns] = grid.tiles(level);
+            (0..rows).flat_map(move |row| (0..columns).map(move |c| TileId::new(level, row, c)))
+        });
+        let tiles = tiles.map(|tile| (tile, pyramid.read_tile_chain(tile).unwrap()));
+        Self {
+            tiles: tiles.collect(),
+            metadata,
+            _folder: folder,
         }
     }
 
     fn heights(&self, tile: TileId) -> Vec<i32> {
-        let step = self.levels.levels[usize::from(tile.level)].step;
-        decode_heights(&self.controls(tile), &self.records[&tile].detail, step)
+        let tile = &self.tiles[&tile];
+        decode_heights(&tile.controls, &tile.detail, tile.step)
+    }
+
+    /// A level's samples where they are data.
+    fn samples(&self, level: u8, size: [usize; 2]) -> Samples {
+        let mut samples = Samples::new(Area::whole(size), vec![0; size[0] * size[1]]);
+        for tile in self.tiles.keys().filter(|tile| tile.level == level) {
+            for (index, height) in self.heights(*tile).iter().enumerate() {
+                let row = tile.row as usize * 128 + index / 129;
+                let column = tile.column as usize * 128 + index % 129;
+                if row < size[0] && column < size[1] {
+                    samples.values[row * size[1] + column] = *height;
+                    if self.is_void(*tile, index) {
+                        samples.set_void(row, column);
+                    }
+                }
+            }
+        }
+        samples
     }
 
     fn is_void(&self, tile: TileId, index: usize) -> bool {
-        self.records[&tile]
-            .voids
-            .as_ref()
-            .is_some_and(|bits| bits[index / 8] >> (index % 8) & 1 == 1)
+        self.tiles[&tile].is_void(index / TILE_SAMPLES, index % TILE_SAMPLES)
     }
 
     /// The finest samples, decoded: none where void.
     fn finest(&self) -> Vec<Vec<Option<i32>>> {
         let [rows, columns] =
-            [self.plan.grid.rows, self.plan.grid.columns].map(|count| count as usize);
+            [self.metadata.grid.rows, self.metadata.grid.columns].map(|count| count as usize);
         let mut field = vec![vec![None; columns]; rows];
-        let finest = self.plan.grid.level_count() - 1;
-        for tile in self.records.keys().filter(|tile| tile.level == finest) {
+        let finest = self.metadata.grid.level_count() - 1;
+        for tile in self.tiles.keys().filter(|tile| tile.level == finest) {
             let heights = self.heights(*tile);
             for (index, height) in heights.iter().enumerate() {
                 let [row, column] = [
@@ -97,7 +98,7 @@ impl Built {
         let grid = raster.header().grid;
         let mut source = vec![0.0; grid.rows as usize * grid.columns as usize];
         raster.read(Window::whole(&grid), &mut source).unwrap();
-        let (unit, eps) = (self.plan.scale.unit(), self.plan.scale.eps);
+        let (unit, eps) = (self.metadata.unit(), self.metadata.eps);
         for (row, line) in self.finest().iter().enumerate() {
             for (column, height) in line.iter().enumerate() {
                 let want = source[row * grid.columns as usize + column];
@@ -114,13 +115,13 @@ impl Built {
 
     /// Checks that neighbours of every level hold equal heights and void bits on their common border.
     fn check_borders(&self) {
-        for tile in self.records.keys() {
+        for tile in self.tiles.keys() {
             let east = TileId::new(tile.level, tile.row, tile.column + 1);
             let south = TileId::new(tile.level, tile.row + 1, tile.column);
             let pairs: [(TileId, [usize; 2], usize); 2] =
                 [(east, [128, 0], 129), (south, [128 * 129, 0], 1)];
             for (other, [mine, theirs], stride) in pairs {
-                if !self.records.contains_key(&other) {
+                if !self.tiles.contains_key(&other) {
                     continue;
                 }
                 let (a, b) = (self.heights(*tile), self.heights(other));
@@ -139,7 +140,7 @@ impl Built {
 
     /// Checks a tile's error by going over all finest samples under it, one by one.
     fn check_error(&self, tile: TileId) {
-        let (heights, finest, grid) = (self.heights(tile), self.finest(), &self.plan.grid);
+        let (heights, finest, grid) = (self.heights(tile), self.finest(), &self.metadata.grid);
         let stride = f64::from(grid.stride(tile.level));
         let [first_row, first_column] = grid.first_sample(tile).map(|first| first as f64);
         let mut worst = 0.0_f64;
@@ -171,14 +172,14 @@ impl Built {
                 worst = worst.max((drawn - f64::from(height)).abs());
             }
         }
-        let record = &self.records[&tile];
+        let record = &self.tiles[&tile];
         let children = record
             .children
             .iter()
             .map(|child| f64::from(child.error))
             .fold(0.0, f64::max);
         let stated = f64::from(record.summary.error);
-        let truth = (worst * self.plan.scale.unit()).max(children);
+        let truth = (worst * self.metadata.unit()).max(children);
         assert!(
             stated >= truth && stated <= truth * 1.000_001,
             "{tile}: {stated} {truth}"
@@ -187,7 +188,7 @@ impl Built {
 }
 
 fn built(raster: &dyn Raster, eps: Option<f64>) -> Built {
-    Built::new(raster, eps).unwrap()
+    Built::new(raster, eps)
 }
 
 fn options(folder: &Path, name: &str, threads: usize) -> BuildOptions {
@@ -232,7 +233,7 @@ fn whole_metres_come_back_exactly_by_default() {
     let built = built(&field, None);
     for (row, line) in built.finest().iter().enumerate() {
         for (column, height) in line.iter().enumerate() {
-            let metres = f64::from(height.unwrap()) * built.plan.scale.unit();
+            let metres = f64::from(height.unwrap()) * built.metadata.unit();
             assert_eq!(metres.round(), field.at(row, column));
         }
     }
@@ -246,7 +247,7 @@ fn rasters_of_one_row_or_column_or_sample_build() {
         built.check_bound(&field);
         built.check_borders();
         assert_eq!(
-            built.levels.levels.len(),
+            built.metadata.levels.len(),
             usize::from(field.header().grid.level_count())
         );
     }
@@ -276,7 +277,7 @@ fn tile_errors_are_true() {
 #[test]
 fn summaries_enclose_all_below() {
     let built = built(&Field::new(300, 421, hills), Some(2.0));
-    for (tile, record) in &built.records {
+    for (tile, record) in &built.tiles {
         let heights = built.heights(*tile);
         assert!(
             heights
@@ -287,7 +288,7 @@ fn summaries_enclose_all_below() {
             assert_eq!(
                 summary,
                 built
-                    .records
+                    .tiles
                     .get(child)
                     .map_or(Summary::default(), |child| child.summary)
             );
@@ -300,16 +301,19 @@ fn summaries_enclose_all_below() {
 #[test]
 fn patch_codes_are_no_less_than_the_patches_errors() {
     let built = built(&Field::new(300, 421, hills), Some(2.0));
-    let (grid, unit) = (&built.plan.grid, built.plan.scale.unit());
-    let finest = Finest::new(built.levels.samples.last().unwrap(), [300, 421]);
-    for (tile, record) in &built.records {
-        let first = grid.first_sample(*tile).map(|first| first as usize);
-        let errors = measure::measure(
-            &built.heights(*tile),
-            first,
-            grid.stride(tile.level) as usize,
-            &finest,
-        );
+    let (grid, unit) = (&built.metadata.grid, built.metadata.unit());
+    let finest = built.samples(grid.level_count() - 1, [300, 421]);
+    let levels: Vec<Samples> = (0..grid.level_count())
+        .map(|level| {
+            let size = grid.tiles(level).map(|count| count as usize * 128 + 1);
+            built.samples(level, size)
+        })
+        .collect();
+    for (tile, record) in &built.tiles {
+        let drawn = Drawn {
+            samples: &levels[usize::from(tile.level)],
+            stride: grid.stride(tile.level) as usize,
+        };
         let base = record.summary.error.max(unit as f32);
         if tile.level + 1 == grid.level_count() {
             // Stride errors of the tile's own heights say it all there.
@@ -318,10 +322,10 @@ fn patch_codes_are_no_less_than_the_patches_errors() {
         }
         for patch in 0..PATCH_COUNT {
             let code = record.patch_codes[patch];
-            for (nibble, error) in [code & 15, code >> 4]
-                .into_iter()
-                .zip(errors.patches[patch])
-            {
+            let [row, column] = [tile.row, tile.column].map(|index| index as usize * 32);
+            let place = [row + patch / 32, column + patch % 32];
+            let errors = drawn.patch(place, &Finest::new(&finest));
+            for (nibble, error) in [(code & 15, errors.coarse), (code >> 4, errors.middle)] {
                 assert!(f64::from(patch_error(nibble, base)) >= error * unit);
                 assert!(nibble == 0 || f64::from(patch_error(nibble - 1, base)) < error * unit);
             }
@@ -342,9 +346,9 @@ fn voids_are_masked_and_filled_smoothly() {
     let built = built(&field, Some(1.0));
     built.check_bound(&field);
     built.check_borders();
-    let root = &built.records[&TileId::ROOT];
+    let root = &built.tiles[&TileId::ROOT];
     assert_eq!(root.summary.flags, Summary::PRESENT | Summary::VOID);
-    let range = f64::from(root.summary.max - root.summary.min) * built.plan.scale.unit();
+    let range = f64::from(root.summary.max - root.summary.min) * built.metadata.unit();
     assert!(range < 900.0, "{range}");
 }
 
@@ -358,7 +362,7 @@ fn a_tile_in_the_middle_of_a_void_is_all_void() {
         }
     });
     let built = built(&field, Some(1.0));
-    let flags = built.records[&TileId::new(3, 1, 1)].summary.flags;
+    let flags = built.tiles[&TileId::new(3, 1, 1)].summary.flags;
     assert_eq!(flags, Summary::PRESENT | Summary::VOID | Summary::ALL_VOID);
 }
 
@@ -389,7 +393,7 @@ fn a_memory_budget_too_small_is_refused_beforehand() {
 }
 
 #[test]
-fn any_number_of_threads_writes_the_same_bytes() {
+fn any_number_of_threads_and_any_memory_writes_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let field = Field::new(700, 421, |row, column| {
         if row.abs_diff(200) < 9 {
@@ -398,9 +402,18 @@ fn any_number_of_threads_writes_the_same_bytes() {
             hills(row, column)
         }
     });
-    let trees = [1, 4].map(|threads| {
-        let options = options(folder.path(), &format!("out{threads}"), threads);
+    let budgets = [(1, 64), (1, 72), (4, 100), (4, 1000)];
+    let trees = budgets.map(|(threads, budget_mib)| {
+        let options = BuildOptions {
+            memory_budget: Some(budget_mib << 20),
+            ..options(
+                folder.path(),
+                &format!("out{threads}-{budget_mib}"),
+                threads,
+            )
+        };
         let report = run(&field, &options).unwrap();
+        assert!(report.memory_bytes <= budget_mib << 20);
         assert_eq!(
             (report.samples, report.levels, report.void_samples),
             ([700, 421], 4, 17 * 421)
@@ -409,7 +422,7 @@ fn any_number_of_threads_writes_the_same_bytes() {
         tree(&options.output, "", &mut files);
         files
     });
-    assert!(trees[0] == trees[1]);
+    assert!(trees.iter().all(|tree| *tree == trees[0]));
     assert!(trees[0].len() > 6);
 }
 

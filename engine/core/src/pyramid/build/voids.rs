@@ -1,259 +1,259 @@
 //! Fills void samples smoothly from their surroundings, so that neighbours fit well: a membrane, near enough.
 //!
 //! Means of known samples are pulled up a pyramid of halved planes; on the way down each plane's gaps take the coarser
-//! plane's heights between its cells and are relaxed by a few sweeps.
+//! plane's heights between its cells and are relaxed by a few sweeps, first over the cells of even row and column sums,
+//! then over the others, so that the order of cells within half a sweep does not matter.
+//!
+//! A cell depends on its plane as far as there are sweeps, and on the coarser plane: every block of a plane is filled
+//! on its own, with a halo. A filled cell keeps its mark, so blocks that find a neighbour filled already start from
+//! the same numbers as those that do not.
 //!
 //! Based on: S. Gortler, R. Grzeszczuk, R. Szeliski, M. Cohen, "The lumigraph", 1996 (pull-push); the relaxation makes
 //! it a cascadic multigrid for Laplace's equation.
 
-use super::samples::LevelSamples;
+use std::path::Path;
+
+use super::area::{Area, Blocks, to_signed};
+use super::passes::in_order;
+use super::planes::SamplePlane;
+use super::samples::Samples;
 use crate::pyramid::PyramidError;
 
-/// Sweeps on each plane.
+/// Sweeps on each plane, two halves each.
 const SWEEPS: usize = 8;
+/// Cells around a block that decide it: one a half sweep.
+const HALO: usize = 2 * SWEEPS;
 
-/// Fills the void samples of the first rows and columns of a level.
-///
-/// # Errors
-/// [`PyramidError::Refused`] when all are void.
+/// Fills the void samples of the first rows and columns of a plane, of which some are known; `side` samples a side of
+/// a block.
 pub(super) fn fill(
-    level: &mut LevelSamples,
-    [rows, columns]: [usize; 2],
+    finest: &SamplePlane,
+    data: [usize; 2],
+    scratch: &Path,
+    side: usize,
 ) -> Result<(), PyramidError> {
-    let Some(voids) = &level.voids else {
-        return Ok(());
-    };
-    if voids.count() == (rows * columns) as u64 {
-        return Err(PyramidError::Refused(format!(
-            "all {rows} x {columns} samples are void: there is no terrain"
-        )));
-    }
-    let width = level.columns;
-    let finest = Cells {
-        rows,
-        columns,
-        known: |row, column| !voids.get(row, column),
-        height: |row, column| f64::from(level.values[row * width + column]),
-    };
-    let mut planes = vec![pull(&finest)];
-    while let Some(last) = planes
-        .last()
-        .filter(|plane| plane.heights.iter().any(Option::is_none))
-    {
-        let next = pull(&last.cells());
-        planes.push(next);
-    }
-    let mut coarser: Option<Plane> = None;
-    for mut plane in planes.into_iter().rev() {
-        if let Some(coarser) = coarser {
-            plane.push(&coarser);
+    let mut planes = Vec::<SamplePlane>::new();
+    let mut size = data;
+    loop {
+        let name = format!("void-{}", planes.len());
+        let half = size.map(|count| count.div_ceil(2));
+        let coarse = SamplePlane::create(scratch, &name, half)?;
+        let gaps = pull(planes.last().unwrap_or(finest), size, &coarse, side / 2)?;
+        planes.push(coarse);
+        size = half;
+        if !gaps {
+            break;
         }
-        coarser = Some(plane);
     }
-    if let Some(coarser) = coarser {
-        fill_finest(level, [rows, columns], &coarser);
+    while let Some(coarser) = planes.pop() {
+        match planes.last() {
+            Some(plane) => push(plane, plane.size(), &coarser, side)?,
+            None => push(finest, data, &coarser, side)?,
+        }
+        coarser.remove()?;
     }
     Ok(())
 }
 
-/// Heights of cells, of which some are known.
-struct Cells<K, H> {
-    rows: usize,
-    columns: usize,
-    known: K,
-    height: H,
+/// Halves a plane: the mean of the known finer cells, a gap where no finer cell is known. True where gaps are left.
+fn pull(
+    fine: &SamplePlane,
+    fine_size: [usize; 2],
+    coarse: &SamplePlane,
+    side: usize,
+) -> Result<bool, PyramidError> {
+    let blocks = Blocks::new(coarse.size(), side);
+    let block = |index| {
+        let area = blocks.area(index);
+        let double = |range: &std::ops::Range<i64>| 2 * range.start..2 * range.end;
+        let below = Area {
+            rows: double(&area.rows),
+            columns: double(&area.columns),
+        };
+        let mean = mean_of_known(&fine.read(&below.and(&Area::whole(fine_size)))?, &area);
+        coarse.write(&area, &mean)?;
+        Ok(mean.voids.is_some())
+    };
+    in_order(blocks.count(), block, |a, b| a | b)
 }
 
-/// One halved plane: the mean of the known finer cells, none where no finer cell is known.
-struct Plane {
-    rows: usize,
-    columns: usize,
-    heights: Vec<Option<f32>>,
-}
-
-/// Halves a plane.
-fn pull(fine: &Cells<impl Fn(usize, usize) -> bool, impl Fn(usize, usize) -> f64>) -> Plane {
-    let [rows, columns] = [fine.rows, fine.columns].map(|count| count.div_ceil(2));
-    let mut heights = Vec::with_capacity(rows * columns);
+fn mean_of_known(fine: &Samples, area: &Area) -> Samples {
+    let mut coarse = Samples::new(area.clone(), vec![0; area.count()]);
+    let [rows, columns] = area.size();
     for row in 0..rows {
         for column in 0..columns {
-            let (mut sum, mut count) = (0.0, 0.0);
+            let (mut sum, mut count) = (0, 0);
             for row in 2 * row..(2 * row + 2).min(fine.rows) {
                 for column in 2 * column..(2 * column + 2).min(fine.columns) {
-                    if (fine.known)(row, column) {
-                        sum += (fine.height)(row, column);
-                        count += 1.0;
+                    if !fine.is_void(row, column) {
+                        sum += i64::from(fine.values[row * fine.columns + column]);
+                        count += 1;
                     }
                 }
             }
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "a starting point for sweeps needs no more"
-            )]
-            heights.push((count > 0.0).then_some((sum / count) as f32));
-        }
-    }
-    Plane {
-        rows,
-        columns,
-        heights,
-    }
-}
-
-impl Plane {
-    fn cells(&self) -> Cells<impl Fn(usize, usize) -> bool, impl Fn(usize, usize) -> f64> {
-        let at = |row: usize, column: usize| self.heights[row * self.columns + column];
-        Cells {
-            rows: self.rows,
-            columns: self.columns,
-            known: move |row, column| at(row, column).is_some(),
-            height: move |row, column| f64::from(at(row, column).unwrap_or(0.0)),
-        }
-    }
-
-    /// Fills the gaps from a filled coarser plane.
-    fn push(&mut self, coarser: &Self) {
-        let gaps: Vec<usize> = (0..self.heights.len())
-            .filter(|index| self.heights[*index].is_none())
-            .collect();
-        for index in &gaps {
-            self.heights[*index] =
-                Some(coarser.between(index / self.columns, index % self.columns));
-        }
-        for _ in 0..SWEEPS {
-            for index in &gaps {
-                let around = neighbours(*index, [self.rows, self.columns], self.columns);
-                let (sum, count) = around.fold((0.0, 0.0), |(sum, count), at| {
-                    (sum + self.heights[at].unwrap_or(0.0), count + 1.0)
-                });
-                self.heights[*index] = Some(sum / f32::max(count, 1.0));
+            if count == 0 {
+                coarse.set_void(row, column);
+            } else {
+                coarse.values[row * columns + column] = mean(sum, count);
             }
         }
     }
-
-    /// The height at a finer plane's cell, linear between this plane's cells.
-    fn between(&self, row: usize, column: usize) -> f32 {
-        let near = |fine: usize, count: usize| {
-            let cell = fine / 2;
-            let other = if fine.is_multiple_of(2) {
-                cell.saturating_sub(1)
-            } else {
-                (cell + 1).min(count - 1)
-            };
-            [cell, other]
-        };
-        let [rows, columns] = [near(row, self.rows), near(column, self.columns)];
-        let at =
-            |row: usize, column: usize| self.heights[row * self.columns + column].unwrap_or(0.0);
-        let line = |row: usize| 0.75 * at(row, columns[0]) + 0.25 * at(row, columns[1]);
-        0.75 * line(rows[0]) + 0.25 * line(rows[1])
-    }
+    coarse
 }
 
-/// Fills the samples themselves, in whole units.
-fn fill_finest(level: &mut LevelSamples, [rows, columns]: [usize; 2], coarser: &Plane) {
-    let Some(voids) = &level.voids else { return };
-    let width = level.columns;
-    let gaps: Vec<usize> = (0..rows)
-        .flat_map(|row| {
-            (0..columns)
-                .filter(move |column| voids.get(row, *column))
-                .map(move |column| row * width + column)
-        })
-        .collect();
-    for index in &gaps {
-        #[expect(clippy::cast_possible_truncation, reason = "means of heights in units")]
-        let height = coarser.between(index / width, index % width).round() as i32;
-        level.values[*index] = height;
-    }
-    for _ in 0..SWEEPS {
-        for index in &gaps {
-            let around = neighbours(*index, [rows, columns], width);
-            let (sum, count) = around.fold((0_i64, 0), |(sum, count), at| {
-                (sum + i64::from(level.values[at]), count + 1)
-            });
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "a mean of heights in units"
-            )]
-            let mean = (sum + count / 2).div_euclid(count.max(1)) as i32;
-            level.values[*index] = mean;
+/// Fills the gaps of a plane's first rows and columns from a filled coarser plane.
+fn push(
+    plane: &SamplePlane,
+    size: [usize; 2],
+    coarser: &SamplePlane,
+    side: usize,
+) -> Result<(), PyramidError> {
+    let blocks = Blocks::new(size, side);
+    let block = |index| {
+        let area = blocks.area(index);
+        if plane.read(&area)?.voids.is_none() {
+            return Ok(());
+        }
+        let halo = area.grown([HALO, HALO]).and(&Area::whole(size));
+        let mut window = plane.read(&halo)?;
+        let half = |range: &std::ops::Range<i64>| range.start / 2..(range.end - 1) / 2 + 1;
+        let above = Area {
+            rows: half(&halo.rows),
+            columns: half(&halo.columns),
+        };
+        let above = above.grown([1, 1]).and(&Area::whole(coarser.size()));
+        start(&mut window, &coarser.read(&above)?);
+        relax(&mut window);
+        plane.write(&area, &window)
+    };
+    in_order(blocks.count(), block, |(), ()| ())
+}
+
+/// Gives every gap the coarser plane's height there.
+fn start(window: &mut Samples, coarser: &Samples) {
+    let columns = window.columns;
+    for (row, at) in window.area.rows.clone().enumerate() {
+        for (column, place) in window.area.columns.clone().enumerate() {
+            if window.is_void(row, column) {
+                window.values[row * columns + column] = between(coarser, at, place);
+            }
         }
     }
 }
 
-/// Indices of the up to four neighbours inside the first rows and columns of an array of some width.
-fn neighbours(
-    index: usize,
-    [rows, columns]: [usize; 2],
-    width: usize,
-) -> impl Iterator<Item = usize> {
-    let (row, column) = (index / width, index % width);
-    let north = (row > 0).then(|| index - width);
-    let south = (row + 1 < rows).then(|| index + width);
-    let west = (column > 0).then(|| index - 1);
-    let east = (column + 1 < columns).then(|| index + 1);
-    [north, west, east, south].into_iter().flatten()
+/// The coarser plane's height at a finer cell, linear between its cells.
+fn between(coarser: &Samples, row: i64, column: i64) -> i32 {
+    let near = |fine: i64, range: &std::ops::Range<i64>| {
+        let cell = fine.div_euclid(2);
+        let other = cell + 2 * fine.rem_euclid(2) - 1;
+        [cell, other.clamp(range.start, range.end - 1)]
+            .map(|at| usize::try_from(at - range.start).unwrap_or(0))
+    };
+    let rows = near(row, &coarser.area.rows);
+    let columns = near(column, &coarser.area.columns);
+    let at = |row: usize, column: usize| i64::from(coarser.values[row * coarser.columns + column]);
+    let line = |row: usize| 3 * at(row, columns[0]) + at(row, columns[1]);
+    mean(3 * line(rows[0]) + line(rows[1]), 16)
+}
+
+/// Relaxes the gaps: each becomes the mean of its neighbours.
+fn relax(window: &mut Samples) {
+    let (rows, columns) = (window.rows, window.columns);
+    let gaps: Vec<[usize; 2]> = (0..rows)
+        .flat_map(|row| (0..columns).map(move |column| [row, column]))
+        .filter(|[row, column]| window.is_void(*row, *column))
+        .collect();
+    let [first_row, first_column] = [window.area.rows.start, window.area.columns.start];
+    let parity = |[row, column]: &[usize; 2]| {
+        (first_row + to_signed(*row) + first_column + to_signed(*column)).rem_euclid(2)
+    };
+    for half in 0..HALO {
+        let turn = to_signed(half % 2);
+        for &[row, column] in gaps.iter().filter(|gap| parity(gap) == turn) {
+            let values = &window.values;
+            let at = row * columns + column;
+            let around = [
+                (row > 0).then(|| at - columns),
+                (row + 1 < rows).then_some(at + columns),
+                (column > 0).then(|| at - 1),
+                (column + 1 < columns).then_some(at + 1),
+            ];
+            let (sum, count) = around.iter().flatten().fold((0, 0), |(sum, count), at| {
+                (sum + i64::from(values[*at]), count + 1)
+            });
+            window.values[at] = mean(sum, count.max(1));
+        }
+    }
+}
+
+/// A mean of heights, rounded half up.
+fn mean(sum: i64, count: i64) -> i32 {
+    #[expect(clippy::cast_possible_truncation, reason = "a mean of i32 is an i32")]
+    let mean = (sum + count / 2).div_euclid(count) as i32;
+    mean
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geo::Grid;
 
-    fn level(side: u32, height: impl Fn(usize, usize) -> Option<i32>) -> LevelSamples {
-        let mut level = LevelSamples::new(
-            &Grid {
-                columns: side,
-                rows: side,
-                origin: [0.0; 2],
-                step: [1.0, -1.0],
-            },
-            0,
-        );
-        for row in 0..side as usize {
-            for column in 0..side as usize {
-                level.values[row * level.columns + column] =
-                    height(row, column).unwrap_or(i32::MIN);
+    fn filled(side: usize, block: usize, height: impl Fn(usize, usize) -> Option<i32>) -> Samples {
+        let folder = tempfile::tempdir().unwrap();
+        let all = Area::whole([side, side]);
+        let plane = SamplePlane::create(folder.path(), "a", [side, side]).unwrap();
+        let mut samples = Samples::new(all.clone(), vec![0; side * side]);
+        for (row, column) in (0..side).flat_map(|row| (0..side).map(move |c| (row, c))) {
+            match height(row, column) {
+                Some(height) => samples.values[row * side + column] = height,
+                None => samples.set_void(row, column),
             }
         }
-        level.take_voids(i32::MIN);
-        level
+        plane.write(&all, &samples).unwrap();
+        fill(&plane, [side, side], folder.path(), block).unwrap();
+        plane.read(&all).unwrap()
+    }
+
+    fn slope(row: usize, column: usize) -> i32 {
+        i32::try_from(40 * row + 24 * column).unwrap()
+    }
+
+    fn hole(row: usize, column: usize) -> bool {
+        row.abs_diff(60) < 20 && column.abs_diff(50) < 12 || row > 100 && column > 110
     }
 
     #[test]
     fn a_hole_in_a_slope_is_filled_with_the_slope() {
-        let slope = |row: usize, column: usize| i32::try_from(40 * row + 24 * column).unwrap();
-        let hole = |row: usize, column: usize| row.abs_diff(60) < 20 && column.abs_diff(50) < 12;
-        let mut level = level(129, |row, column| {
-            (!hole(row, column)).then(|| slope(row, column))
+        let level = filled(129, 64, |row, column| {
+            (row > 100 || !hole(row, column)).then(|| slope(row, column))
         });
-        fill(&mut level, [129, 129]).unwrap();
         for row in 0..129 {
             for column in 0..129 {
                 let error = (level.values[row * 129 + column] - slope(row, column)).abs();
-                assert!(
-                    error <= if hole(row, column) { 120 } else { 0 },
-                    "{row} {column} {error}"
-                );
+                let limit = if row <= 100 && hole(row, column) {
+                    120
+                } else {
+                    0
+                };
+                assert!(error <= limit, "{row} {column} {error}");
             }
         }
     }
 
     #[test]
-    fn one_known_sample_fills_all() {
-        let mut level = level(100, |row, column| (row == 3 && column == 99).then_some(41));
-        fill(&mut level, [100, 100]).unwrap();
-        assert!((0..100).all(|row| {
-            level.values[row * 129..][..100]
-                .iter()
-                .all(|height| *height == 41)
-        }));
+    fn blocks_of_any_side_fill_the_same() {
+        let sides = [16, 64, 1024].map(|block| {
+            filled(129, block, |row, column| {
+                (!hole(row, column)).then(|| slope(row * row % 97, column))
+            })
+        });
+        assert!(sides[0] == sides[1] && sides[1] == sides[2]);
     }
 
     #[test]
-    fn all_void_is_refused() {
-        let error = fill(&mut level(5, |_, _| None), [5, 5]).unwrap_err();
-        assert!(error.to_string().contains("all 5 x 5 samples are void"));
+    fn one_known_sample_fills_all() {
+        let level = filled(100, 32, |row, column| {
+            (row == 3 && column == 99).then_some(41)
+        });
+        assert!(level.values.iter().all(|height| *height == 41));
     }
 }

@@ -11,6 +11,7 @@ use std::{
 use lru::LruCache;
 
 use super::{Store, StoreError, checked_length};
+use crate::pyramid::files::read_exact_at;
 
 /// Files kept open: well under what systems allow a process.
 const OPEN_FILES: NonZero<usize> = NonZero::new(64).unwrap();
@@ -55,7 +56,7 @@ impl Store for FileStore {
         let file = self.file(key).map_err(wrap)?;
         let bytes = file.metadata().map_err(wrap)?.len();
         let mut buffer = vec![0; checked_length(|| self.name(key), &range, bytes)?];
-        read_at(&file, &mut buffer, range.start).map_err(wrap)?;
+        read_exact_at(&file, &mut buffer, range.start).map_err(wrap)?;
         Ok(buffer)
     }
 
@@ -69,22 +70,4 @@ impl Store for FileStore {
     fn name(&self, key: &str) -> String {
         self.path(key).display().to_string()
     }
-}
-
-#[cfg(unix)]
-fn read_at(file: &File, buffer: &mut [u8], offset: u64) -> std::io::Result<()> {
-    std::os::unix::fs::FileExt::read_exact_at(file, buffer, offset)
-}
-
-#[cfg(windows)]
-fn read_at(file: &File, mut buffer: &mut [u8], mut offset: u64) -> std::io::Result<()> {
-    while !buffer.is_empty() {
-        let count = std::os::windows::fs::FileExt::seek_read(file, buffer, offset)?;
-        if count == 0 {
-            return Err(std::io::ErrorKind::UnexpectedEof.into());
-        }
-        buffer = &mut buffer[count..];
-        offset += count as u64;
-    }
-    Ok(())
 }

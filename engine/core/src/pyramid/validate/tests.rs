@@ -44,7 +44,7 @@ fn written_with(level: u8, change: impl Fn(&mut Bytes) + Sync) -> (tempfile::Tem
             if index == level {
                 change(&mut bytes);
             }
-            Some(bytes.bytes)
+            Ok(Some(bytes.bytes))
         };
         shards.push(
             writer
@@ -52,7 +52,7 @@ fn written_with(level: u8, change: impl Fn(&mut Bytes) + Sync) -> (tempfile::Tem
                 .unwrap(),
         );
     }
-    let texels = |id: TileId| pyramid.read_color(id).unwrap();
+    let texels = |id: TileId| pyramid.read_color(id);
     shards.push(
         writer
             .write_color_shard(0, [1, 1], [0, 0], &texels)

@@ -3,20 +3,24 @@
 use std::{
     fs::File,
     io::{Seek, SeekFrom, Write},
+    path::Path,
 };
 
 use rayon::prelude::*;
 
 use crate::{
     geo::TileId,
-    pyramid::shard::{SHARD_TILES, ShardIndex, encode_image, encode_record, shard_shape, z_order},
+    pyramid::{
+        PyramidError,
+        shard::{SHARD_TILES, ShardIndex, encode_image, encode_record, shard_shape, z_order},
+    },
 };
 
 /// Chunks in memory at once, for each of which a record is made.
 const BATCH: usize = 64;
 
 /// What a tile's chunk holds, before it is compressed; none for a tile that is absent.
-pub(super) type Contents<'a> = &'a (dyn Fn(TileId) -> Option<Vec<u8>> + Sync);
+pub type Contents<'a> = &'a (dyn Fn(TileId) -> Result<Option<Vec<u8>>, PyramidError> + Sync);
 
 /// What one shard holds.
 pub(super) struct Block {
@@ -30,34 +34,46 @@ pub(super) struct Block {
 
 impl Block {
     /// Writes chunks after the place of the index, then the index; returns how many chunks there are.
-    pub(super) fn write(&self, file: &mut File, contents: Contents<'_>) -> std::io::Result<u32> {
+    pub(super) fn write(
+        &self,
+        file: &mut File,
+        path: &Path,
+        contents: Contents<'_>,
+    ) -> Result<u32, PyramidError> {
+        let failed = || PyramidError::io("writing", path);
         let shape = shard_shape(self.tiles);
         let mut index = ShardIndex::new(shape);
         let mut offset = ShardIndex::byte_count(shape) as u64;
-        file.seek(SeekFrom::Start(offset))?;
+        file.seek(SeekFrom::Start(offset)).map_err(failed())?;
         for slots in z_order(shape).chunks(BATCH) {
             let chunks: Vec<_> = slots
                 .par_iter()
-                .map(|&slot| self.chunk(slot, contents))
+                .map(|&slot| self.chunk(slot, path, contents))
                 .collect();
             for (&slot, chunk) in slots.iter().zip(chunks) {
                 let Some(chunk) = chunk? else { continue };
-                file.write_all(&chunk)?;
+                file.write_all(&chunk).map_err(failed())?;
                 index.set(slot, offset..offset + chunk.len() as u64);
                 offset += chunk.len() as u64;
             }
         }
-        file.rewind()?;
-        file.write_all(&index.encode())?;
+        file.rewind()
+            .and_then(|()| file.write_all(&index.encode()))
+            .map_err(failed())?;
         Ok(u32::try_from(index.chunk_count()).unwrap_or(u32::MAX))
     }
 
-    fn chunk(&self, slot: [u32; 2], contents: Contents<'_>) -> std::io::Result<Option<Vec<u8>>> {
+    fn chunk(
+        &self,
+        slot: [u32; 2],
+        path: &Path,
+        contents: Contents<'_>,
+    ) -> Result<Option<Vec<u8>>, PyramidError> {
         let [row, column] = [0, 1].map(|axis| self.shard[axis] * SHARD_TILES + slot[axis]);
         if row >= self.tiles[0] || column >= self.tiles[1] {
             return Ok(None);
         }
-        let Some(bytes) = contents(TileId::new(self.level, row, column)) else {
+        let Some(bytes) = contents(TileId::new(self.level, row, column))? else {
             return Ok(None);
         };
         assert_eq!(
@@ -71,6 +87,8 @@ impl Block {
         } else {
             encode_record(&bytes, &self.sections)
         };
-        chunk.map(Some)
+        chunk
+            .map(Some)
+            .map_err(PyramidError::io("compressing", path))
     }
 }

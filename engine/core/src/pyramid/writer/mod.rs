@@ -4,6 +4,7 @@
 //! OUT.building/   unfinished    what is being built, locked by who builds it
 //!                 manifest/journal.jsonl    a line a finished shard
 //!                 tile/…, color/…           shards, each written whole
+//!                 scratch/…                 what passes of the build leave for each other
 //! publish:        array metadata, manifest, the root zarr.json, then the folder becomes OUT
 //! ```
 //!
@@ -25,8 +26,8 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use self::{
-    block::{Block, Contents},
-    place::{check_target, claim, remove_if_there, settle_replacement, start_over},
+    block::Block,
+    place::{check_target, claim, remove_folder, remove_if_there, settle_replacement, start_over},
 };
 use super::{
     COLOR_TEXELS, Metadata, PyramidError, RecordLayout,
@@ -34,12 +35,15 @@ use super::{
     shard::shard_count,
     zarr,
 };
-use crate::geo::TileId;
+
+pub use block::Contents;
 
 /// Says that a folder is a build, and of what.
 const MARKER: &str = "unfinished";
 /// One line a finished shard, while building.
 const JOURNAL: &str = "manifest/journal.jsonl";
+/// What passes of the build leave for each other.
+const SCRATCH: &str = "scratch";
 /// One line a shard, when done.
 pub(super) const MANIFEST: &str = "manifest/shards.jsonl";
 
@@ -125,19 +129,19 @@ impl PyramidWriter {
 
     /// Writes the records of one level's 32 × 32 block of tiles: row and column `shard` of its shards.
     ///
-    /// `record` is asked for every tile of the level in the block, from several threads; tiles it has none for are
+    /// `records` is asked for every tile of the level in the block, from several threads; tiles it has none for are
     /// absent. Where an interrupted run has written this shard, nothing is asked.
     ///
     /// # Errors
     ///
-    /// Where the disk is full or a file cannot be written.
+    /// Where the disk is full or a file cannot be written; what `records` says.
     pub fn write_shard(
         &self,
         level: u8,
         layout: &RecordLayout,
         tiles: [u32; 2],
         shard: [u32; 2],
-        records: &(dyn Fn(TileId) -> Option<Vec<u8>> + Sync),
+        records: Contents<'_>,
     ) -> Result<ShardInfo, PyramidError> {
         let key = zarr::shard_key(&format!("tile/{level}"), shard, 1);
         let block = Block {
@@ -160,7 +164,7 @@ impl PyramidWriter {
         level: u8,
         tiles: [u32; 2],
         shard: [u32; 2],
-        texels: &(dyn Fn(TileId) -> Option<Vec<u8>> + Sync),
+        texels: Contents<'_>,
     ) -> Result<ShardInfo, PyramidError> {
         let key = zarr::shard_key(&format!("color/{level}"), shard, 3);
         let chunk_bytes = COLOR_TEXELS * COLOR_TEXELS * 4;
@@ -185,7 +189,7 @@ impl PyramidWriter {
         record_bytes: u32,
         tiles: [u32; 2],
         shard: [u32; 2],
-        records: &(dyn Fn(TileId) -> Option<Vec<u8>> + Sync),
+        records: Contents<'_>,
     ) -> Result<ShardInfo, PyramidError> {
         let key = zarr::shard_key(&format!("feature/{level}"), shard, 1);
         let block = Block {
@@ -196,6 +200,13 @@ impl PyramidWriter {
             sections: Vec::new(),
         };
         self.write_block(key, &block, records)
+    }
+
+    /// The folder for what passes of the build leave for each other: it goes with the build or is removed by
+    /// [`Self::publish`].
+    #[must_use]
+    pub fn scratch(&self) -> PathBuf {
+        self.folder.join(SCRATCH)
     }
 
     /// Writes array metadata, manifest and root, and gives the pyramid its name.
@@ -213,6 +224,7 @@ impl PyramidWriter {
         self.write_nodes(metadata)?;
         self.write_manifest(shards)?;
         remove_if_there(&self.folder.join(JOURNAL))?;
+        remove_folder(&self.scratch())?;
         let root = zarr::root_json(metadata).map_err(|error| invalid(error.to_string()))?;
         write_whole(&self.folder.join(zarr::NODE), &root)?;
         remove_if_there(&self.folder.join(MARKER))?;
@@ -244,7 +256,7 @@ impl PyramidWriter {
         }
         let mut chunks = 0;
         write_whole_with(&path, |file| {
-            chunks = block.write(file, contents)?;
+            chunks = block.write(file, &path, contents)?;
             Ok(())
         })?;
         let (bytes, blake3) = file_hash(&path).map_err(PyramidError::io("reading back", &path))?;

@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use super::MARKER;
+use super::{MARKER, SCRATCH};
 use crate::pyramid::{PyramidError, files::sibling, zarr};
 
 /// True for a folder with a pyramid's root in it, of whatever version.
@@ -81,12 +81,8 @@ pub(super) fn start_over(
     marker: &mut File,
     fingerprint: &str,
 ) -> Result<(), PyramidError> {
-    for name in ["tile", "color", "manifest"] {
-        let path = folder.join(name);
-        match fs::remove_dir_all(&path) {
-            Err(error) if error.kind() == ErrorKind::NotFound => {}
-            other => other.map_err(PyramidError::io("removing", path))?,
-        }
+    for name in ["tile", "feature", "color", "manifest", SCRATCH] {
+        remove_folder(&folder.join(name))?;
     }
     remove_if_there(&folder.join(zarr::NODE))?;
     let manifest = folder.join("manifest");
@@ -101,6 +97,13 @@ pub(super) fn start_over(
 
 pub(super) fn remove_if_there(path: &Path) -> Result<(), PyramidError> {
     match fs::remove_file(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+        other => other.map_err(PyramidError::io("removing", path)),
+    }
+}
+
+pub(super) fn remove_folder(path: &Path) -> Result<(), PyramidError> {
+    match fs::remove_dir_all(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
         other => other.map_err(PyramidError::io("removing", path)),
     }

@@ -135,9 +135,9 @@ fn a_resumed_build_keeps_whole_shards_and_writes_broken_ones_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("out.zarr");
     let layout = RecordLayout::new(&sample::metadata(100, 100).levels[0]);
-    let record = |_| Some(vec![1; layout.byte_count()]);
-    let other = |_| Some(vec![2; layout.byte_count()]);
-    let write = |fingerprint: &str, record: &(dyn Fn(TileId) -> Option<Vec<u8>> + Sync)| {
+    let record = |_| Ok(Some(vec![1; layout.byte_count()]));
+    let other = |_| Ok(Some(vec![2; layout.byte_count()]));
+    let write = |fingerprint: &str, record: Contents<'_>| {
         let writer = PyramidWriter::resume(&path, false, fingerprint).unwrap();
         writer
             .write_shard(0, &layout, [1, 1], [0, 0], record)
