@@ -8,7 +8,6 @@ pub mod feature;
 mod files;
 mod metadata;
 mod patch_code;
-mod query;
 mod reader;
 mod record;
 #[cfg(test)]
@@ -28,7 +27,6 @@ pub use error::PyramidError;
 pub use feature::{FeatureGroup, FeatureMetadata};
 pub use metadata::{ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};
 pub use patch_code::{HALF_OCTAVES, NEVER, patch_error, patch_nibble};
-pub use query::Heights;
 pub use reader::Pyramid;
 pub use record::{Record, RecordLayout, RecordParts, VOID_BYTES, number_bytes};
 pub use shard::{SHARD_TILES, shard_count, shard_shape};
