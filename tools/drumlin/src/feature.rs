@@ -11,7 +11,7 @@ use drumlin_core::{
         write_obj,
     },
     geo::Crs,
-    pyramid::{Heights, Pyramid},
+    terrain::{PyramidSource, Surface},
 };
 use drumlin_terminal::{outcome::Outcome, print};
 
@@ -138,36 +138,7 @@ impl Site {
         let places = self.places()?;
         let middle = middle(&places);
         let cage = match &self.ground {
-            Some(pyramid) => {
-                let pyramid = Arc::new(
-                    Pyramid::open(pyramid).with_context(|| pyramid.display().to_string())?,
-                );
-                let frame = pyramid.metadata().frame();
-                let origin = frame.to_world(middle);
-                let path = path(&places, |place| frame.to_world(place), origin)?;
-                let heights = Heights::new(pyramid);
-                let height = |[x, y]: [f64; 2]| -> Result<f64> {
-                    let place = frame.to_crs([x + origin[0], y + origin[1]]);
-                    heights
-                        .height_at(place)?
-                        .ok_or_else(|| anyhow!("there is no ground at {}, {}", place[0], place[1]))
-                };
-                // A generator asks for heights and knows no errors: the first is kept, and told at the end.
-                let base = height([0.0; 2])?;
-                let failed = RefCell::new(None);
-                let ground = |place| match height(place) {
-                    Ok(height) => height - base,
-                    Err(error) => {
-                        failed.borrow_mut().get_or_insert(error);
-                        0.0
-                    }
-                };
-                let cage = shape(&path, &ground)?;
-                match failed.into_inner() {
-                    Some(error) => return Err(error),
-                    None => cage,
-                }
-            }
+            Some(pyramid) => on_ground(pyramid, &places, middle, shape)?,
             None => {
                 let scale = if self.geographic {
                     Crs::wgs84().ellipsoid.metres_per_degree(middle[1])
@@ -201,6 +172,41 @@ impl Site {
                 self.along
             ),
         }
+    }
+}
+
+/// Makes a cage that follows a pyramid's ground, from the ground at its middle.
+fn on_ground(
+    pyramid: &std::path::Path,
+    places: &[[f64; 2]],
+    middle: [f64; 2],
+    shape: impl FnOnce(&Path, GroundHeight<'_>) -> Result<Cage, CageError>,
+) -> Result<Cage> {
+    let source = PyramidSource::open(pyramid).with_context(|| pyramid.display().to_string())?;
+    let surface = Surface::new(Arc::new(source));
+    let origin = surface.frame().to_world(middle);
+    let path = path(places, |place| surface.frame().to_world(place), origin)?;
+    let height = |[x, y]: [f64; 2]| -> Result<f64> {
+        let place = [x + origin[0], y + origin[1]];
+        surface.ground_at(place)?.ok_or_else(|| {
+            let [x, y] = surface.frame().to_crs(place);
+            anyhow!("there is no ground at {x}, {y}")
+        })
+    };
+    // A generator asks for heights and knows no errors: the first is kept, and told at the end.
+    let base = height([0.0; 2])?;
+    let failed = RefCell::new(None);
+    let ground = |place| match height(place) {
+        Ok(height) => height - base,
+        Err(error) => {
+            failed.borrow_mut().get_or_insert(error);
+            0.0
+        }
+    };
+    let cage = shape(&path, &ground)?;
+    match failed.into_inner() {
+        Some(error) => Err(error),
+        None => Ok(cage),
     }
 }
 

@@ -1,4 +1,4 @@
-//! `drumlin height`: heights of places, of the surface as stored at the finest level.
+//! `drumlin height`: heights of places, of the finest surface there is: its samples, and the features that stand in them.
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -6,7 +6,8 @@ use anyhow::Result;
 use clap::Args;
 use drumlin_core::{
     geo::Extent,
-    pyramid::{Heights, Pyramid},
+    stream::TileSource,
+    terrain::{PyramidSource, Surface},
 };
 use drumlin_terminal::{outcome::Outcome, print};
 use serde::Serialize;
@@ -35,12 +36,13 @@ struct Place {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
-    let pyramid = Arc::new(Pyramid::open(&arguments.pyramid)?);
-    let extent = pyramid.metadata().grid.extent();
-    let heights = Heights::new(pyramid);
+    let source = PyramidSource::open(&arguments.pyramid)?;
+    let extent = source.metadata().grid.extent();
+    let surface = Surface::new(Arc::new(source));
     let mut places = arguments.at.clone();
     for place in &mut places {
-        place.height = heights.height_at([place.x, place.y])?;
+        let world = surface.frame().to_world([place.x, place.y]);
+        place.height = surface.height_at(world)?;
     }
     let text = if arguments.json {
         serde_json::to_string_pretty(&places)? + "\n"

@@ -42,7 +42,7 @@ enum Verb {
     /// Checks a pyramid's files
     #[command(after_help = EXIT_CODES)]
     Validate(validate::Arguments),
-    /// Heights of places, of the surface as stored at the finest level
+    /// Heights of places: of the finest samples, and of features where they stand (the highest of an overhang)
     #[command(after_help = EXIT_CODES)]
     Height(height::Arguments),
     /// Looks into a cage: counts, exact places of its surface, refinement

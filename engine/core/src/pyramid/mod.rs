@@ -9,7 +9,6 @@ mod files;
 pub(crate) mod light;
 mod metadata;
 mod patch_code;
-mod query;
 mod reader;
 mod record;
 #[cfg(test)]
@@ -29,7 +28,6 @@ pub use error::PyramidError;
 pub use feature::{FeatureGroup, FeatureMetadata};
 pub use metadata::{ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};
 pub use patch_code::{HALF_OCTAVES, NEVER, patch_error, patch_nibble};
-pub use query::Heights;
 pub use reader::Pyramid;
 pub use record::{Record, RecordLayout, RecordParts, VOID_BYTES, number_bytes};
 pub use shard::{SHARD_TILES, shard_count, shard_shape};

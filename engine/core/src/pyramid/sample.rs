@@ -12,7 +12,7 @@ use crate::geo::{
 };
 
 /// Height in units at a finest sample, data or not.
-pub(super) fn height(row: i64, column: i64) -> i32 {
+pub(crate) fn height(row: i64, column: i64) -> i32 {
     let hills = 900.0 * (row as f64 / 37.0).sin() + 700.0 * (column as f64 / 53.0).cos();
     let noise = (row * 7919 + column * 104_729).rem_euclid(31) - 15;
     #[expect(clippy::cast_possible_truncation, reason = "small numbers")]
@@ -21,7 +21,7 @@ pub(super) fn height(row: i64, column: i64) -> i32 {
 }
 
 /// True for the finest samples of a round hole.
-pub(super) fn is_void(row: i64, column: i64) -> bool {
+pub(crate) fn is_void(row: i64, column: i64) -> bool {
     (row - 120).pow(2) + (column - 60).pow(2) < 900
 }
 

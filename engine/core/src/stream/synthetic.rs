@@ -85,6 +85,12 @@ impl Synthetic {
         self
     }
 
+    /// With finest samples so many metres apart.
+    pub(crate) fn with_step(mut self, metres: f64) -> Self {
+        self.metadata.grid.step = [metres, -metres];
+        self
+    }
+
     /// Every tile in memory.
     pub(crate) fn whole_tree(&self) -> Tree {
         let mut tree = Tree::new(&self.metadata, Arc::new(self.tile(TileId::ROOT)));

@@ -14,6 +14,7 @@ use crate::{
     cage::Cage,
     geo::QUAD_SAMPLES,
     pyramid::{PyramidError, Tile},
+    reference::shared::NONE,
 };
 
 /// Metres by which a triangle's sides may be missed: neighbours round their common side alike, but not a place beside it.
@@ -24,6 +25,8 @@ const NEAR: f64 = 1e-6;
 pub(super) struct FeatureSurface {
     place: CutPlace,
     mesh: FeatureMesh,
+    /// The mesh's positions; on the cut's border exactly where the samples are, whose cells meet it there.
+    positions: Vec<[f64; 3]>,
     /// Buckets a row.
     columns: usize,
     buckets: Vec<Bucket>,
@@ -54,6 +57,7 @@ impl FeatureSurface {
         };
         let mut surface = Self {
             place,
+            positions: positions(&mesh, place.step),
             mesh,
             columns,
             buckets: vec![empty; rows * columns],
@@ -107,7 +111,7 @@ impl FeatureSurface {
     fn corners(&self, triangle: usize) -> [[f64; 3]; 3] {
         [0, 1, 2].map(|corner| {
             let vertex = self.mesh.indices[3 * triangle + corner] as usize;
-            self.mesh.positions[vertex].map(f64::from)
+            self.positions[vertex]
         })
     }
 
@@ -179,6 +183,26 @@ impl FeatureSurface {
             }
         }
     }
+}
+
+/// The positions of a mesh's vertices, metres from its origin; those on the cut's border not rounded to floats.
+fn positions(mesh: &FeatureMesh, step: [f64; 2]) -> Vec<[f64; 3]> {
+    let position = |(position, &border): (&[f32; 3], &u32)| {
+        let [x, y, z] = position.map(f64::from);
+        if border == NONE {
+            return [x, y, z];
+        }
+        [
+            (x / step[0]).round() * step[0],
+            (y / step[1]).round() * step[1],
+            z,
+        ]
+    };
+    mesh.positions
+        .iter()
+        .zip(&mesh.border)
+        .map(position)
+        .collect()
 }
 
 fn subtract(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

@@ -115,14 +115,14 @@ impl Store for CountingStore {
 mod tests {
     use super::*;
     use crate::{
-        pyramid::{Heights, sample},
+        pyramid::sample,
         stream::View,
         terrain::{Planner, PlannerDescriptor, Surface},
     };
 
-    fn source(folder: &tempfile::TempDir) -> Arc<PyramidSource> {
+    fn source(folder: &tempfile::TempDir, rows: u32, columns: u32) -> Arc<PyramidSource> {
         let path = folder.path().join("out.zarr");
-        sample::write(&path, 700, 500);
+        sample::write(&path, rows, columns);
         Arc::new(PyramidSource::open(&path).unwrap())
     }
 
@@ -134,7 +134,7 @@ mod tests {
             error_px: 0.1,
             ..PlannerDescriptor::default()
         };
-        let mut planner = Planner::new(source(&folder), wait).unwrap();
+        let mut planner = Planner::new(source(&folder, 700, 500), wait).unwrap();
         let view = View::looking_at([0.0, 0.0, 300.0], [500.0, 0.0, 0.0], 1.0, [640, 480]);
         let (plan, stats) = planner.plan(&view);
         assert_eq!((stats.tiles_missing, stats.failures), (0, 0));
@@ -142,23 +142,54 @@ mod tests {
         assert!(stats.bytes_read > 0);
     }
 
+    /// The height in units at a row and column of finest samples.
+    fn at(surface: &Surface, row: f64, column: f64) -> Option<f64> {
+        let grid = surface.grid();
+        let place = surface.frame().to_world(grid.position(row, column));
+        let height = surface.height_at(place).unwrap();
+        height.map(|metres| metres / surface.unit())
+    }
+
     #[test]
-    fn the_surface_is_what_the_pyramid_says() {
+    fn samples_have_their_stored_heights_and_voids_have_none() {
         let folder = tempfile::tempdir().unwrap();
-        let source = source(&folder);
-        let (heights, surface) = (
-            Heights::new(Arc::clone(source.pyramid())),
-            Surface::new(source),
-        );
-        for index in 0..500 {
-            let place = [
-                -2500.0 + 10.3 * f64::from(index),
-                3400.0 - 13.7 * f64::from(index),
-            ];
-            let stored = heights.height_at(surface.frame().to_crs(place)).unwrap();
-            let drawn = surface.height_at(place).unwrap();
-            assert_eq!(stored.is_some(), drawn.is_some());
-            assert!(stored.zip(drawn).is_none_or(|(a, b)| (a - b).abs() < 1e-6));
+        let surface = Surface::new(source(&folder, 300, 200));
+        // The finest level's codes are of three units.
+        let half_step = 1.0;
+        for row in (0..300).step_by(23).chain([127, 128, 129, 299]) {
+            for column in (0..200).step_by(17).chain([127, 128, 129, 199]) {
+                let want =
+                    (!sample::is_void(row, column)).then(|| f64::from(sample::height(row, column)));
+                let got = at(&surface, row as f64, column as f64);
+                assert_eq!(got.is_some(), want.is_some(), "{row} {column}");
+                // Coordinates were rounded on their way: to a millionth of a cell, whose slopes are below 100 units.
+                let near = half_step + 1e-4;
+                assert!(
+                    got.zip(want)
+                        .is_none_or(|(got, want)| (got - want).abs() <= near),
+                    "{row} {column}"
+                );
+            }
         }
+    }
+
+    #[test]
+    fn one_sample_and_one_row_have_heights() {
+        let folder = tempfile::tempdir().unwrap();
+        let one = Surface::new(source(&folder, 1, 1));
+        assert!(at(&one, 0.0, 0.0).is_some() && at(&one, 0.5, 0.0).is_none());
+        let folder = tempfile::tempdir().unwrap();
+        let row = Surface::new(source(&folder, 1, 140));
+        assert!(at(&row, 0.0, 139.0).is_some() && at(&row, 0.0, 130.5).is_some());
+    }
+
+    #[test]
+    fn a_triangle_with_a_void_corner_is_void_and_its_neighbour_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let surface = Surface::new(source(&folder, 300, 200));
+        // The hole's westernmost sample of row 120 is column 31; north-west of it all is there.
+        assert!(sample::is_void(120, 31) && !sample::is_void(120, 30) && !sample::is_void(119, 30));
+        assert_eq!(at(&surface, 119.9, 30.5), None);
+        assert!(at(&surface, 120.0, 30.0).is_some());
     }
 }

@@ -94,13 +94,30 @@ impl Surface {
         &self.frame
     }
 
-    /// The height at world x and y, metres; none where the surface is void and outside the data set.
+    /// The height at world x and y, metres; none where the surface is void and outside the data set. Where an overhang
+    /// has several, the highest.
     ///
     /// # Errors
     ///
     /// When a tile cannot be read.
     pub fn height_at(&self, place: [f64; 2]) -> Result<Option<f64>, PyramidError> {
         Ok(self.plane_at(place)?.map(|plane| plane.height))
+    }
+
+    /// The height at world x and y of the samples alone, metres, as if no feature stood in them: what features are laid
+    /// into.
+    ///
+    /// # Errors
+    ///
+    /// When a tile cannot be read.
+    pub fn ground_at(&self, place: [f64; 2]) -> Result<Option<f64>, PyramidError> {
+        let Some(spot) = self.spot(place) else {
+            return Ok(None);
+        };
+        let plane = self
+            .tile(spot.tile)?
+            .plane(&spot, &self.tile_frame(spot.tile));
+        Ok(plane.map(|plane| plane.height))
     }
 
     /// The upward unit normal of the triangle at world x and y; none where there is no height.
@@ -245,26 +262,41 @@ impl Surface {
     }
 
     fn plane_at(&self, place: [f64; 2]) -> Result<Option<Plane>, PyramidError> {
-        let grid = *self.grid();
-        let [row, column] = grid.row_column(self.frame.to_crs(place));
-        let (Some((tile_row, row, y)), Some((tile_column, column, x))) =
-            (locate(row, grid.rows), locate(column, grid.columns))
-        else {
+        let Some(spot) = self.spot(place) else {
             return Ok(None);
         };
-        let id = TileId::new(self.finest(), tile_row, tile_column);
-        let kept = self.tile(id)?;
-        if kept.is_cut(row, column)
-            && let Some(group) = kept.feature_at([tile_row, tile_column], [row, column])
-        {
+        let kept = self.tile(spot.tile)?;
+        if let Some(group) = kept.feature_at(&spot) {
             let hit = self.feature(group)?.height_at(place);
             return Ok(hit.map(|(height, [east, north, up])| Plane {
                 height,
                 slope: [-east / up, -north / up],
             }));
         }
-        Ok(kept.plane(row, column, [x, y], &self.tile_frame(id)))
+        Ok(kept.plane(&spot, &self.tile_frame(spot.tile)))
     }
+
+    /// Where world x and y are among the finest samples; none outside the data set.
+    fn spot(&self, place: [f64; 2]) -> Option<Spot> {
+        let grid = self.grid();
+        let [row, column] = grid.row_column(self.frame.to_crs(place));
+        let (tile_row, row, y) = locate(row, grid.rows)?;
+        let (tile_column, column, x) = locate(column, grid.columns)?;
+        Some(Spot {
+            tile: TileId::new(self.finest(), tile_row, tile_column),
+            cell: [row, column],
+            part: [x, y],
+        })
+    }
+}
+
+/// A place among the finest samples.
+struct Spot {
+    tile: TileId,
+    /// Row and column of its cell in the tile.
+    cell: [usize; 2],
+    /// Where in the cell: x east, y south, 0 to 1.
+    part: [f64; 2],
 }
 
 /// Where the samples of a tile are in the world.
@@ -314,10 +346,11 @@ impl Kept {
             .is_some_and(|bits| bits[row] >> column & 1 != 0)
     }
 
-    /// The feature whose cut a cell of the tile at a row and column lies in.
-    fn feature_at(&self, tile: [u32; 2], cell: [usize; 2]) -> Option<&FeatureGroup> {
+    /// The feature that stands in the place of a place's cell.
+    fn feature_at(&self, spot: &Spot) -> Option<&FeatureGroup> {
+        let tile = [spot.tile.row, spot.tile.column];
         let [row, column] =
-            [0, 1].map(|axis| tile[axis] as usize * TILE_QUADS + cell[axis] / QUAD_SAMPLES);
+            [0, 1].map(|axis| tile[axis] as usize * TILE_QUADS + spot.cell[axis] / QUAD_SAMPLES);
         self.features.iter().find(|group| {
             let [row0, column0, row1, column1] = group.cut.map(|patch| patch as usize);
             (row0..row1).contains(&row) && (column0..column1).contains(&column)
@@ -332,15 +365,10 @@ impl Kept {
                 .all(|&[row, column]| !self.tile.is_void(row, column))
     }
 
-    /// The plane at a part of a cell (x east, y south, 0 to 1). Corners without weight have no say, so that edges and
-    /// samples belong to whichever triangle is there.
-    fn plane(
-        &self,
-        row: usize,
-        column: usize,
-        [x, y]: [f64; 2],
-        frame: &TileFrame,
-    ) -> Option<Plane> {
+    /// The plane of the samples at a place. Corners without weight have no say, so that edges and samples belong to
+    /// whichever triangle is there.
+    fn plane(&self, spot: &Spot, frame: &TileFrame) -> Option<Plane> {
+        let ([row, column], [x, y]) = (spot.cell, spot.part);
         let lower = y >= x;
         let weights = if lower {
             [1.0 - y, y - x, x]

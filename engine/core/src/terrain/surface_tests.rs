@@ -217,9 +217,14 @@ fn the_cache_stays_small() {
     assert!(surface.kept() <= 128);
 }
 
-/// Rough ground with an arch of 200 units across the border of two tiles.
+/// Rough ground with an arch of 200 units across the border of two tiles, samples a metre apart.
 fn with_arch() -> Surface {
-    let mut source = Synthetic::new(513, 513, 7);
+    with_arch_in(1.0)
+}
+
+/// The same with samples so many metres apart.
+fn with_arch_in(step: f64) -> Surface {
+    let mut source = Synthetic::new(513, 513, 7).with_step(step);
     let finest = source.metadata().finest();
     let place = synthetic::arch_place(1.0, 1.0 / 16.0);
     let tiles = vec![TileId::new(finest, 0, 0), TileId::new(finest, 0, 1)];
@@ -298,6 +303,32 @@ fn heights_meet_on_a_cuts_border_and_nowhere_is_a_hole() {
         worst = worst.max((at(20.0 - 1e-5) - at(20.0 + 1e-5)).abs());
     }
     assert!(worst < 1e-3, "{worst}");
+}
+
+#[test]
+fn a_cut_has_heights_to_its_last_sliver_and_the_ground_is_there_without_its_feature() {
+    // None is a float: rounded to floats, corners of the mesh would lie up to two millimetres inside the cut.
+    for step in [1001.3, 900.1, 900.7] {
+        let surface = with_arch_in(step);
+        for at in (0..8).map(f64::from) {
+            let sliver = 1.2e-6;
+            for [row, column] in [
+                [20.0 + 32.0 - sliver, 104.0 + 6.0 * at],
+                [20.0 + 4.0 * at, 104.0 + 48.0 - sliver],
+            ] {
+                let place = sample(&surface, row, column);
+                let [height, ground] = [surface.height_at(place), surface.ground_at(place)]
+                    .map(|height| height.unwrap().unwrap());
+                // Both are less than a hundred units over a millionth of a cell off the border's height, which is 1e-5 m,
+                // and the mesh's heights are floats of a hundred metres.
+                assert!((height - ground).abs() < 1e-4, "{row} {column}");
+            }
+        }
+        let crown = sample(&surface, 34.0, 128.0);
+        let [height, ground] = [surface.height_at(crown), surface.ground_at(crown)]
+            .map(|height| height.unwrap().unwrap());
+        assert!(height > 55.0 && (ground - 50.0).abs() < 1.0);
+    }
 }
 
 #[test]
