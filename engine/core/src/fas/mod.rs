@@ -29,7 +29,7 @@ mod rows;
 mod stencil;
 mod tables;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 
 pub use depth::{DepthRule, Feature, Features, MAX_RULE_DEPTH};
 pub use evaluate::Sample;
