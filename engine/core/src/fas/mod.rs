@@ -31,7 +31,7 @@ mod rows;
 mod stencil;
 mod tables;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 
 pub use crate::subdiv::Real;
 pub use blocks::{Blocks, CapEntry, Changes, Entry, Piece, Positions};

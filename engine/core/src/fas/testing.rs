@@ -1,8 +1,8 @@
-//! Cages for the tests of this module.
+//! Cages for the tests of tables and of what executes them.
 
 use std::{fs, path::PathBuf};
 
-use crate::cage::{Cage, CageBudget, read_obj};
+use crate::cage::{Cage, CageBudget, Crease, Faces, Tags, read_obj};
 
 /// A file of the shared reference; says that it was skipped where there is none.
 pub(super) fn reference(name: &str) -> Option<PathBuf> {
@@ -23,4 +23,27 @@ pub(super) fn reference(name: &str) -> Option<PathBuf> {
 pub(super) fn cage(name: &str) -> Option<Cage> {
     let path = reference(&format!("{name}.obj"))?;
     Some(read_obj(&fs::read(path).expect("a file"), CageBudget::default()).expect("a cage"))
+}
+
+/// Five quads around a vertex, each bent its own way, a crease along one of its edges.
+pub(crate) fn fan(sharpness: f64) -> Cage {
+    let mut positions = vec![[0.0, 0.0, 0.5]];
+    for i in 0..10 {
+        let (sin, cos) = (f64::from(i) * std::f64::consts::PI / 5.0).sin_cos();
+        let radius = if i % 2 == 0 { 1.0 } else { 1.4 };
+        positions.push([radius * cos, radius * sin, 0.1 * f64::from(i * i % 7)]);
+    }
+    let mut faces = Faces::default();
+    for i in 0..5 {
+        faces.push(&[0, 1 + 2 * i, 2 + 2 * i, 1 + (2 * i + 2) % 10]);
+    }
+    let creases = vec![Crease {
+        vertices: [0, 1],
+        sharpness,
+    }];
+    let tags = Tags {
+        creases,
+        ..Tags::default()
+    };
+    Cage::new(positions, faces, &tags).unwrap()
 }

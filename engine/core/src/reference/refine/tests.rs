@@ -2,33 +2,9 @@
 
 use super::*;
 use crate::{
-    cage::{Cage, Crease, Faces, Tags},
-    fas::{Piece, Tables},
+    fas::{Piece, Tables, testing::fan},
     reference::shared::refine::{RefineGround, RefineSite},
 };
-
-/// Five quads around a vertex, each bent its own way, a crease along one of its edges.
-fn fan(sharpness: f64) -> Cage {
-    let mut positions = vec![[0.0, 0.0, 0.5]];
-    for i in 0..10 {
-        let (sin, cos) = (f64::from(i) * std::f64::consts::PI / 5.0).sin_cos();
-        let radius = if i % 2 == 0 { 1.0 } else { 1.4 };
-        positions.push([radius * cos, radius * sin, 0.1 * f64::from(i * i % 7)]);
-    }
-    let mut faces = Faces::default();
-    for i in 0..5 {
-        faces.push(&[0, 1 + 2 * i, 2 + 2 * i, 1 + (2 * i + 2) % 10]);
-    }
-    let creases = vec![Crease {
-        vertices: [0, 1],
-        sharpness,
-    }];
-    let tags = Tags {
-        creases,
-        ..Tags::default()
-    };
-    Cage::new(positions, faces, &tags).unwrap()
-}
 
 fn ground() -> RefineGround {
     RefineGround {
