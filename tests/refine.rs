@@ -5,7 +5,7 @@ use std::{collections::HashMap, fs};
 use drumlin::{Headless, Refine, offscreen, wgpu};
 use drumlin_core::{
     cage::{Cage, CageBudget, read_obj},
-    fas::{Piece, RenderTable, Tables},
+    fas::{PieceIndex, RenderTable, Tables},
     reference::{
         refine,
         shared::{
@@ -68,17 +68,17 @@ fn reference(name: &str) -> Option<(Cage, Vec<Exact>)> {
 }
 
 /// Pieces by face.
-fn pieces(table: &RenderTable) -> HashMap<u32, Vec<Piece>> {
-    let mut pieces: HashMap<u32, Vec<Piece>> = HashMap::new();
+fn pieces(table: &RenderTable) -> HashMap<u32, Vec<PieceIndex>> {
+    let mut pieces: HashMap<u32, Vec<PieceIndex>> = HashMap::new();
     for (patch, at) in table.patches.iter().zip(0..) {
         let of_face = pieces.entry(patch.place.face).or_default();
-        of_face.push(Piece::Patch(at));
+        of_face.push(PieceIndex::Patch(at));
     }
     for (cap, at) in table.caps.iter().zip(0..) {
         pieces
             .entry(cap.place.face)
             .or_default()
-            .push(Piece::Cap(at));
+            .push(PieceIndex::Cap(at));
     }
     pieces
 }
@@ -96,22 +96,22 @@ fn has_worn_off(cage: &Cage, depth: u8) -> bool {
 /// Where a sample is a place that tables of [`DEPTH`] hold exactly: on a bicubic patch, or on a corner of a cap.
 fn site(
     table: &RenderTable,
-    pieces: &[Piece],
+    pieces: &[PieceIndex],
     sample: &Exact,
     vertices: bool,
-) -> Option<(Piece, [f64; 2])> {
+) -> Option<(PieceIndex, [f64; 2])> {
     if !sample.level.map_or(vertices, |level| level <= DEPTH) {
         return None;
     }
     let found = pieces.iter().find_map(|&piece| {
         let place = match piece {
-            Piece::Patch(patch) => table.patches[patch as usize].place,
-            Piece::Cap(cap) => table.caps[cap as usize].place,
+            PieceIndex::Patch(patch) => table.patches[patch as usize].place,
+            PieceIndex::Cap(cap) => table.caps[cap as usize].place,
         };
         Some((piece, place.local(sample.uv)?))
     })?;
     let is_corner = found.1.iter().all(|part| *part == 0.0 || *part == 1.0);
-    (matches!(found.0, Piece::Patch(_)) || is_corner).then_some(found)
+    (matches!(found.0, PieceIndex::Patch(_)) || is_corner).then_some(found)
 }
 
 /// No ground of its own: one tile of a metre a sample.

@@ -10,7 +10,7 @@ use drumlin_core::{
     geo::CrsKind,
     pyramid::{
         PyramidError, VerticalReference,
-        build::{BuildOptions, BuildReport, Imagery, build},
+        build::{BuildOptions, BuildPlan, BuildReport, Imagery, build, plan},
         feature::FeatureInput,
     },
 };
@@ -18,6 +18,9 @@ use drumlin_terminal::{outcome::Outcome, print, size};
 use serde_json::{Value, json};
 
 use crate::{cage, interrupt, progress::Progress, sources};
+
+/// Bytes of decoded strips and tiles kept of all inputs together.
+const CACHE_BYTES: u64 = 64 << 20;
 
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
@@ -37,7 +40,8 @@ pub(crate) struct Arguments {
     /// Threads [default: all cores]; the result does not depend on it
     #[arg(short = 'j', long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
-    /// Memory the build may take, as 512MiB or 4GB; refused beforehand where that is too little
+    /// Memory the build may take, as 512MiB or 4GB; refused beforehand where that is too little; the result does not
+    /// depend on it
     #[arg(long, value_name = "BYTES", value_parser = size::parse)]
     memory_budget: Option<u64>,
     /// CRS units from sample to sample, for files that do not say where they lie
@@ -58,6 +62,9 @@ pub(crate) struct Arguments {
     /// Replaces a pyramid that is there; never anything else
     #[arg(long)]
     overwrite: bool,
+    /// Prints what would be done (tasks, tiles, bytes, time) and builds nothing
+    #[arg(long)]
+    dry_run: bool,
     /// A summary for programs on standard output
     #[arg(long)]
     json: bool,
@@ -86,6 +93,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
         _ => None,
     };
     let options = options(arguments)?;
+    if arguments.dry_run {
+        let plan = plan(&*raster, imagery.as_ref(), &options)?;
+        print(&if arguments.json {
+            format!("{:#}\n", serde_json::to_value(&plan)?)
+        } else {
+            plan_lines(arguments, &plan)
+        })?;
+        return Ok(Outcome::Done);
+    }
     let progress = Progress::new();
     let tell = |step: drumlin_core::pyramid::build::Progress| {
         progress.tell(step.stage.label(), step.done, step.total);
@@ -148,6 +164,7 @@ fn open(arguments: &Arguments) -> Result<Box<dyn Raster>> {
     let options = OpenOptions {
         spacing: arguments.spacing,
         scale: arguments.scale,
+        cache_bytes: Some(cache_bytes(arguments)),
         ..OpenOptions::default()
     };
     let mut rasters = Vec::new();
@@ -170,6 +187,14 @@ fn open(arguments: &Arguments) -> Result<Box<dyn Raster>> {
     rasters
         .pop()
         .ok_or_else(|| PyramidError::Refused("no input".into()).into())
+}
+
+/// Bytes of decoded parts kept for each input: together no more than one alone would have, nor than a quarter of the
+/// budget.
+fn cache_bytes(arguments: &Arguments) -> usize {
+    let budget = arguments.memory_budget.unwrap_or(u64::MAX) / 4;
+    let all = usize::try_from(budget.min(CACHE_BYTES)).unwrap_or(usize::MAX);
+    all / arguments.inputs.len().max(1)
 }
 
 /// Reads the picture; one that says where it lies must say so in the terrain's CRS.
@@ -236,4 +261,35 @@ fn lines(arguments: &Arguments, report: &BuildReport) -> String {
         "\n  {:.1} s, {samples:.1} million samples a second\n",
         report.seconds
     )
+}
+
+fn plan_lines(arguments: &Arguments, plan: &BuildPlan) -> String {
+    let [rows, columns] = plan.samples;
+    let mut text = format!("{}, as planned\n", arguments.output.display());
+    text += &format!(
+        "  {columns} x {rows} samples, {} levels, {} tiles\n",
+        plan.levels, plan.tiles
+    );
+    text += &format!(
+        "  {} threads, blocks of {side} x {side} tiles, at most {} of memory, {} of scratch files\n",
+        plan.threads,
+        size::display(plan.memory_bytes),
+        size::display(plan.scratch_bytes),
+        side = plan.block_tiles
+    );
+    for pass in &plan.passes {
+        text += &format!(
+            "  {:<10} {:>8} tasks, {:>10} tiles\n",
+            pass.name, pass.tasks, pass.tiles
+        );
+    }
+    match (plan.height_bytes, plan.seconds) {
+        (Some(bytes), Some(seconds)) => {
+            text + &format!(
+                "  about {} of heights in about {seconds:.0} s\n",
+                size::display(bytes)
+            )
+        }
+        _ => text + "  bytes and time unknown: the windows that were tried are void\n",
+    }
 }

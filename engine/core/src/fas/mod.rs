@@ -41,5 +41,5 @@ pub use evaluate::Sample;
 pub use feature::{FeatureKind, features};
 pub use patch::{Patch, Place, RenderTable};
 pub use rows::{BlendRow, LevelRows, PointCounts};
-pub use stencil::{Piece, StencilTerm};
+pub use stencil::{PieceIndex, StencilTerm};
 pub use tables::{MAX_DEPTH, Tables};

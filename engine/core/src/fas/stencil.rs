@@ -14,7 +14,7 @@ use crate::subdiv::{CREASE_LIMIT, crease_tangent, smooth_limit, smooth_tangent};
 
 /// A patch or a cap, by its place in the render table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Piece {
+pub enum PieceIndex {
     /// Of [`RenderTable::patches`].
     Patch(u32),
     /// Of [`RenderTable::caps`].
@@ -30,10 +30,10 @@ impl RenderTable {
     /// # Panics
     /// When the table has no such piece, or is of other points.
     #[must_use]
-    pub fn evaluate<T: Real>(&self, piece: Piece, points: &[[T; 3]], uv: [f64; 2]) -> Sample<T> {
+    pub fn evaluate<T: Real>(&self, piece: PieceIndex, points: &[[T; 3]], uv: [f64; 2]) -> Sample<T> {
         match piece {
-            Piece::Patch(patch) => self.patches[patch as usize].evaluate(points, uv),
-            Piece::Cap(cap) => self.caps[cap as usize].evaluate(points, uv),
+            PieceIndex::Patch(patch) => self.patches[patch as usize].evaluate(points, uv),
+            PieceIndex::Cap(cap) => self.caps[cap as usize].evaluate(points, uv),
         }
     }
 }

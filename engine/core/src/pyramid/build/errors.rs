@@ -87,6 +87,9 @@ impl Errors {
                 range.start * QUAD_SAMPLES..range.end * QUAD_SAMPLES + 1
             };
             let [rows, columns] = &patches;
+            if rows.is_empty() || columns.is_empty() {
+                continue;
+            }
             let own = Area::new(samples(rows), samples(columns));
             errors.write(first, &patches, &drawn.read(&own)?, &finest)?;
         }
@@ -103,6 +106,13 @@ impl Errors {
     }
 }
 
+/// Blocks of finest samples that are measured.
+pub(super) fn block_count(grid: &Grid) -> u64 {
+    let [rows, columns] =
+        [grid.rows, grid.columns].map(|count| u64::from(count).div_ceil(SIDE as u64));
+    rows * columns
+}
+
 impl ErrorPlane {
     fn create(
         scratch: &Path,
@@ -112,7 +122,12 @@ impl ErrorPlane {
     ) -> Result<Self, PyramidError> {
         let stride = grid.stride(level) as usize;
         let entry = SIDE.min(QUAD_SAMPLES * stride);
-        let size = data.map(|count| count.div_ceil(entry));
+        // Every patch with data in it; one that starts where both the data and the tiles end is none.
+        let tiles = grid.tiles(level).map(|count| count as usize);
+        let size = [0, 1].map(|axis| {
+            let all = tiles[axis] * TILE_CELLS * stride / entry;
+            data[axis].div_ceil(entry).min(all)
+        });
         Ok(Self {
             plane: Plane::create(scratch, &format!("errors-{level}"), size)?,
             stride,
@@ -129,7 +144,7 @@ impl ErrorPlane {
     fn entries(&self, first: [usize; 2]) -> [std::ops::Range<usize>; 2] {
         let size = self.plane.size();
         [0, 1].map(|axis| {
-            let start = first[axis] / self.entry;
+            let start = (first[axis] / self.entry).min(size[axis]);
             start..(start + SIDE / self.entry).min(size[axis])
         })
     }

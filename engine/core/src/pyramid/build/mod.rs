@@ -13,6 +13,7 @@ mod area;
 mod border;
 mod color;
 mod errors;
+mod estimate;
 mod features;
 mod fit;
 mod ground;
@@ -38,6 +39,7 @@ mod voids;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
+pub use estimate::{BuildPlan, PassPlan, plan};
 pub use options::{BuildOptions, BuildReport, Imagery, Progress, Stage};
 
 use self::errors::Errors;

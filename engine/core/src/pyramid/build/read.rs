@@ -47,6 +47,13 @@ pub(super) fn window_samples(raster: &dyn Raster, window_samples: u64) -> u64 {
     u64::from(shape[0]) * u64::from(shape[1])
 }
 
+/// How many windows [`read_finest`] reads.
+pub(super) fn window_count(raster: &dyn Raster, window_samples: u64) -> u64 {
+    let grid = raster.header().grid;
+    let shape = window_shape(&grid, raster.part_shape(), window_samples);
+    Windows { grid, shape }.count() as u64
+}
+
 /// Rows and columns of the windows: whole parts of the file, or pieces of one where it is larger than a window may be;
 /// rather wide than high, so that parts as wide as the raster are read once.
 fn window_shape(grid: &Grid, [part_rows, part_columns]: [u32; 2], samples: u64) -> [u32; 2] {

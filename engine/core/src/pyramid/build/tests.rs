@@ -240,8 +240,16 @@ fn whole_metres_come_back_exactly_by_default() {
 }
 
 #[test]
-fn rasters_of_one_row_or_column_or_sample_build() {
-    for (rows, columns) in [(1, 1), (1, 200), (300, 1), (2, 2), (129, 129), (130, 3)] {
+fn rasters_of_one_row_or_column_or_sample_or_of_whole_tiles_build() {
+    for (rows, columns) in [
+        (1, 1),
+        (1, 200),
+        (300, 1),
+        (2, 2),
+        (129, 129),
+        (130, 3),
+        (513, 257),
+    ] {
         let field = Field::new(rows, columns, hills);
         let built = built(&field, Some(1.0));
         built.check_bound(&field);

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{
-    fas::{Piece, Tables, testing::fan},
+    fas::{PieceIndex, Tables, testing::fan},
     reference::shared::refine::{RefineGround, RefineSite},
 };
 
@@ -17,8 +17,8 @@ fn ground() -> RefineGround {
 
 /// Corners, sides and the middle of every piece.
 fn sites(tables: &Tables) -> Vec<RefineSite> {
-    let patches = (0..tables.render.patches.len()).map(|patch| Piece::Patch(patch as u32));
-    let caps = (0..tables.render.caps.len()).map(|cap| Piece::Cap(cap as u32));
+    let patches = (0..tables.render.patches.len()).map(|patch| PieceIndex::Patch(patch as u32));
+    let caps = (0..tables.render.caps.len()).map(|cap| PieceIndex::Cap(cap as u32));
     let places = [[0.0, 0.0], [1.0, 1.0], [0.5, 0.0], [0.25, 0.625]];
     let mut sites = Vec::new();
     for piece in patches.chain(caps) {
@@ -66,7 +66,7 @@ fn an_offset_lifts_a_vertex_and_tilts_it() {
     let cage = fan(0.0);
     let tables = Tables::classic(cage.topology(), 1).unwrap();
     let site = RefineSite {
-        piece: Piece::Patch(0),
+        piece: PieceIndex::Patch(0),
         uv: [0.5, 0.5],
         offset: None,
         position_of: 0,

@@ -6,7 +6,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::{FeatureVertex, NONE};
-use crate::fas::{LevelRows, Piece, RenderTable, Tables};
+use crate::fas::{LevelRows, PieceIndex, RenderTable, Tables};
 
 /// Task: means of four points.
 pub const REFINE_MEANS: u32 = 0;
@@ -79,7 +79,7 @@ pub struct RefineGround {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RefineSite {
     /// The patch or cap.
-    pub piece: Piece,
+    pub piece: PieceIndex,
     /// The place on it.
     pub uv: [f64; 2],
     /// What is added to its height, and to the height's derivatives by u and v.
@@ -294,7 +294,7 @@ impl Packer {
         let mut packed = vec![NONE; table.patches.len()];
         let mut count = 0;
         for site in sites {
-            if let Piece::Patch(patch) = site.piece
+            if let PieceIndex::Patch(patch) = site.piece
                 && packed[patch as usize] == NONE
             {
                 packed[patch as usize] = count;
@@ -306,8 +306,8 @@ impl Packer {
             .iter()
             .map(|site| {
                 let source = match site.piece {
-                    Piece::Patch(patch) => packed[patch as usize],
-                    Piece::Cap(cap) => {
+                    PieceIndex::Patch(patch) => packed[patch as usize],
+                    PieceIndex::Cap(cap) => {
                         self.stencil(&table.caps[cap as usize].stencil(site.uv)) | REFINE_STENCIL
                     }
                 };

@@ -16,7 +16,7 @@ use std::collections::HashMap;
 
 use super::{FeatureShape, FeatureTable};
 use crate::{
-    fas::{Piece, Place, Tables},
+    fas::{PieceIndex, Place, Tables},
     reference::shared::{NONE, refine::RefineSite},
 };
 
@@ -59,10 +59,10 @@ pub(super) fn table(shape: &FeatureShape, tables: Tables) -> FeatureTable {
         indices: Vec::new(),
     };
     for (patch, at) in tables.render.patches.iter().zip(0..) {
-        builder.piece(Piece::Patch(at), patch.place, patch.finer);
+        builder.piece(PieceIndex::Patch(at), patch.place, patch.finer);
     }
     for (cap, at) in tables.render.caps.iter().zip(0..) {
-        builder.piece(Piece::Cap(at), cap.place, cap.finer);
+        builder.piece(PieceIndex::Cap(at), cap.place, cap.finer);
     }
     FeatureTable {
         sites: builder.sites,
@@ -73,7 +73,7 @@ pub(super) fn table(shape: &FeatureShape, tables: Tables) -> FeatureTable {
 }
 
 impl Builder<'_> {
-    fn piece(&mut self, piece: Piece, place: Place, finer: u8) {
+    fn piece(&mut self, piece: PieceIndex, place: Place, finer: u8) {
         let count = (2_u32 >> place.level).max(1);
         let side = ONE >> place.level;
         let step = side / count;
@@ -107,7 +107,7 @@ impl Builder<'_> {
     }
 
     /// The vertex at steps (u, v) of a face, made when it is not there yet.
-    fn vertex(&mut self, piece: Piece, place: Place, at: [u32; 2]) -> u32 {
+    fn vertex(&mut self, piece: PieceIndex, place: Place, at: [u32; 2]) -> u32 {
         let (on, is_sharp) = self.on(place.face, at);
         let face = if is_sharp { place.face } else { NONE };
         let key = Key { on, face };
