@@ -30,7 +30,12 @@ impl RenderTable {
     /// # Panics
     /// When the table has no such piece, or is of other points.
     #[must_use]
-    pub fn evaluate<T: Real>(&self, piece: PieceIndex, points: &[[T; 3]], uv: [f64; 2]) -> Sample<T> {
+    pub fn evaluate<T: Real>(
+        &self,
+        piece: PieceIndex,
+        points: &[[T; 3]],
+        uv: [f64; 2],
+    ) -> Sample<T> {
         match piece {
             PieceIndex::Patch(patch) => self.patches[patch as usize].evaluate(points, uv),
             PieceIndex::Cap(cap) => self.caps[cap as usize].evaluate(points, uv),
