@@ -9,6 +9,7 @@ use drumlin_core::{
         Cage, CageBudget, CageInfo, LimitSample, LimitSurface, Place, read_obj, refine, write_obj,
     },
     fas::{MAX_DEPTH, Tables},
+    reference::shared::refine::bytes_by_level,
 };
 use drumlin_terminal::{outcome::Outcome, print};
 use serde_json::{Value, json};
@@ -135,11 +136,15 @@ fn tables(cage: &Cage, depth: u8) -> Result<Value> {
         }
     }
     let [one, adjacent, opposite, three, four] = templates;
+    let moved = bytes_by_level(&tables);
     let levels: Vec<Value> = (1..)
-        .zip(&tables.levels)
-        .map(|(level, rows): (u32, _)| {
+        .zip(tables.levels.iter().zip(&moved[1..]))
+        .map(|(level, (rows, moved)): (u32, _)| {
             let counts = rows.counts();
-            json!({"level": level, "face": counts.face, "edge": counts.edge, "vertex": counts.vertex, "all": counts.total()})
+            json!({
+                "level": level, "face": counts.face, "edge": counts.edge, "vertex": counts.vertex, "all": counts.total(),
+                "device_bytes": moved.total(),
+            })
         })
         .collect();
     let whole = patches.iter().filter(|patch| patch.finer == 0).count();

@@ -17,8 +17,8 @@ fn ground() -> RefineGround {
 
 /// Corners, sides and the middle of every piece.
 fn sites(tables: &Tables) -> Vec<RefineSite> {
-    let patches = (0..tables.render.patches.len()).map(|patch| PieceIndex::Patch(patch as u32));
-    let caps = (0..tables.render.caps.len()).map(|cap| PieceIndex::Cap(cap as u32));
+    let patches = (0..).take(tables.render.patches.len()).map(PieceIndex::Patch);
+    let caps = (0..).take(tables.render.caps.len()).map(PieceIndex::Cap);
     let places = [[0.0, 0.0], [1.0, 1.0], [0.5, 0.0], [0.25, 0.625]];
     let mut sites = Vec::new();
     for piece in patches.chain(caps) {
@@ -27,7 +27,7 @@ fn sites(tables: &Tables) -> Vec<RefineSite> {
                 piece,
                 uv,
                 offset: None,
-                position_of: sites.len() as u32,
+                position_of: u32::try_from(sites.len()).unwrap(),
             });
         }
     }

@@ -109,6 +109,12 @@ impl LevelBytes {
     }
 }
 
+/// What the points of tables move on a device: the cage's phantoms first, then levels 1, 2, ….
+#[must_use]
+pub fn bytes_by_level(tables: &Tables) -> Vec<LevelBytes> {
+    Packer::of(tables).levels
+}
+
 /// A feature's tables as a device executes them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RefineTables {
@@ -138,11 +144,7 @@ impl RefineTables {
         ground: &RefineGround,
         sites: &[RefineSite],
     ) -> Self {
-        let mut packer = Packer::default();
-        packer.level(&tables.base);
-        for rows in &tables.levels {
-            packer.level(rows);
-        }
+        let mut packer = Packer::of(tables);
         let (patches_word, vertices_word) = packer.sites(&tables.render, sites);
         let header = RefineHeader {
             step: ground.step.map(narrow),
@@ -206,6 +208,16 @@ struct Packer {
 }
 
 impl Packer {
+    /// All levels' rows.
+    fn of(tables: &Tables) -> Self {
+        let mut packer = Self::default();
+        packer.level(&tables.base);
+        for rows in &tables.levels {
+            packer.level(rows);
+        }
+        packer
+    }
+
     fn word(&self) -> u32 {
         short(self.words.len())
     }
