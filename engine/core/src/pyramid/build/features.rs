@@ -29,6 +29,11 @@ impl Ground for Finest<'_> {
     fn sample(&self, row: u32, column: u32) -> i32 {
         self.samples.values[row as usize * self.samples.columns + column as usize]
     }
+
+    fn is_void(&self, row: u32, column: u32) -> bool {
+        let voids = self.samples.voids.as_ref();
+        voids.is_some_and(|voids| voids.get(row as usize, column as usize))
+    }
 }
 
 /// What a tile knows of the features in it.
