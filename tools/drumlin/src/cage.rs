@@ -6,12 +6,13 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, Subcommand};
 use drumlin_core::{
     cage::{
-        Cage, CageBudget, CageInfo, LimitSample, LimitSurface, Place, read_obj, refine, write_obj,
+        Cage, CageBudget, CageInfo, LimitSample, LimitSurface, Place, read_obj, refine,
+        refine_times, write_obj,
     },
     fas::{MAX_DEPTH, Tables},
     reference::shared::refine::bytes_by_level,
 };
-use drumlin_terminal::{outcome::Outcome, print};
+use drumlin_terminal::{outcome::Outcome, print, write};
 use serde_json::{Value, json};
 
 /// Uniform refinements one command makes: each has four times the faces.
@@ -51,7 +52,7 @@ enum Verb {
         /// The cage, as OBJ with tags
         #[arg(value_name = "FILE.obj")]
         file: PathBuf,
-        /// How often; each time four times the faces
+        /// How often; each time four times the faces, up to 2^27 face corners
         #[arg(long, value_name = "D", value_parser = clap::value_parser!(u8).range(0..=i64::from(REFINE_LIMIT)))]
         depth: u8,
         /// The file to write
@@ -69,12 +70,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
             depth,
             output,
         } => {
-            let mut cage = read(file)?;
-            for _ in 0..*depth {
-                cage = refine(&cage).with_context(|| file.display().to_string())?;
-            }
-            fs::write(output, write_obj(&cage))
-                .with_context(|| format!("{}: writing failed", output.display()))?;
+            let fine = refine_times(&read(file)?, *depth, CageBudget::default())
+                .with_context(|| format!("{}, refined {depth} times", file.display()))?;
+            write(output, write_obj(&fine).as_bytes())?;
         }
     }
     Ok(Outcome::Done)

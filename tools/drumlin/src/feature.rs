@@ -1,6 +1,6 @@
 //! `drumlin feature`: makes the cage of a landform along a path, to be laid into a terrain by `build --features`.
 
-use std::{cell::RefCell, fs, path::PathBuf, sync::Arc};
+use std::{cell::RefCell, path::PathBuf, sync::Arc};
 
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, Subcommand};
@@ -13,7 +13,7 @@ use drumlin_core::{
     geo::Crs,
     terrain::{PyramidSource, Surface},
 };
-use drumlin_terminal::{outcome::Outcome, print};
+use drumlin_terminal::{outcome::Outcome, print, write};
 
 use crate::arguments::coordinates;
 
@@ -157,8 +157,7 @@ impl Site {
         );
         match &self.output {
             None => print(&text)?,
-            Some(file) => fs::write(file, text)
-                .with_context(|| format!("{}: writing failed", file.display()))?,
+            Some(file) => write(file, text.as_bytes())?,
         }
         Ok(())
     }

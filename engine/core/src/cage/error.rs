@@ -108,7 +108,7 @@ pub enum CageError {
         count: u32,
     },
     /// More than the caller allows.
-    #[error("the cage has more than {limit} {what}, the budget of this reader")]
+    #[error("the cage has more than {limit} {what}, which is the budget")]
     Budget {
         /// What there is too much of.
         what: &'static str,

@@ -29,7 +29,7 @@ pub use obj::{CageBudget, read_obj, write_obj};
 pub use outline::boundary_loops;
 pub use placement::Placement;
 pub use topology::{Cage, NONE, Topology};
-pub use uniform::refine;
+pub use uniform::{refine, refine_times};
 
 #[cfg(test)]
 mod tests;

@@ -151,9 +151,12 @@ impl Reader {
             1.. => index - 1,
             _ => vertex_count + index,
         };
+        if vertex < 0 {
+            return Err(syntax("a face counts back past the first vertex", word));
+        }
         u32::try_from(vertex).map_err(|_| CageError::MissingVertex {
             face: self.faces.count(),
-            vertex: index.unsigned_abs(),
+            vertex: vertex.unsigned_abs(),
             vertex_count: vertex_count as u32,
         })
     }
@@ -355,7 +358,11 @@ mod tests {
             ),
             (
                 "v 0 0 0\nf 1 2 1000000000000\n",
-                "line 2: face 0 names vertex 1000000000000, but there are only 1 vertices",
+                "line 2: face 0 names vertex 999999999999, but there are only 1 vertices",
+            ),
+            (
+                "v 0 0 0\nf -1 -2 1\n",
+                "line 2: a face counts back past the first vertex: \"-2\"",
             ),
             (
                 "v 0 0 0\nt crease 2/1/0 0 1 -1\n",
@@ -385,7 +392,7 @@ mod tests {
         let error = read_obj(QUADS.as_bytes(), budget).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "line 7: the cage has more than 5 vertices, the budget of this reader"
+            "line 7: the cage has more than 5 vertices, which is the budget"
         );
         let budget = CageBudget {
             vertices: 6,

@@ -17,6 +17,7 @@
 
 use super::error::CageError;
 use super::faces::{Corner, Crease, Faces, Tags};
+use super::obj::CageBudget;
 use super::topology::{Cage, NONE, Topology};
 use crate::subdiv::{child_sharpness, edge_mask, vertex_mask};
 
@@ -41,6 +42,26 @@ pub fn refine(cage: &Cage) -> Result<Cage, CageError> {
         child_faces(topology),
         &child_tags(topology),
     )
+}
+
+/// The cage so many levels finer, refused beforehand where it would have more face corners than the budget.
+///
+/// # Errors
+/// [`CageError::Budget`].
+pub fn refine_times(cage: &Cage, depth: u8, budget: CageBudget) -> Result<Cage, CageError> {
+    // Every corner becomes a quad.
+    let corners = u128::from(cage.topology().corner_count()) << (2 * u32::from(depth)).min(64);
+    if corners > u128::from(budget.corners) {
+        return Err(CageError::Budget {
+            what: "face corners",
+            limit: budget.corners,
+        });
+    }
+    let mut fine = cage.clone();
+    for _ in 0..depth {
+        fine = refine(&fine)?;
+    }
+    Ok(fine)
 }
 
 /// Vertex points, edge points, face points.
@@ -194,6 +215,28 @@ mod tests {
         assert_eq!(topology.vertex_sharpness(0), f64::INFINITY);
         assert_eq!((0..16).filter(|&face| topology.is_hole(face)).count(), 4);
         assert_eq!(fine.positions()[0], [0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn refining_keeps_to_a_budget_beforehand() {
+        let cage = read(PYRAMID);
+        let budget = CageBudget {
+            vertices: 1000,
+            corners: 16 * 16,
+        };
+        let fine = refine_times(&cage, 2, budget).unwrap();
+        assert_eq!(u64::from(fine.topology().corner_count()), budget.corners);
+        let twice = refine(&refine(&cage).unwrap()).unwrap();
+        assert_eq!(fine.positions(), twice.positions());
+        for depth in [3, 255] {
+            assert_eq!(
+                refine_times(&cage, depth, budget).unwrap_err(),
+                CageError::Budget {
+                    what: "face corners",
+                    limit: 256
+                }
+            );
+        }
     }
 
     #[test]

@@ -16,7 +16,10 @@ pub(super) fn sibling(path: &Path, suffix: &str) -> PathBuf {
 }
 
 /// Writes a file so that it is whole or not there, on the disk and not only in the cache.
-pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PyramidError> {
+///
+/// # Errors
+/// [`PyramidError::Io`]; what was at the path is still there then.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PyramidError> {
     write_whole_with(path, |file| {
         file.write_all(bytes)
             .map_err(PyramidError::io("writing", path))

@@ -7,32 +7,32 @@ use lru::LruCache;
 
 use super::area::{Area, Blocks};
 use super::planes::{ControlPlane, SamplePlane};
+use super::samples::Samples;
 use crate::pyramid::PyramidError;
 use crate::pyramid::feature::Ground;
 
 /// Numbers a side of what is read at once.
 const SIDE: usize = 128;
-/// So many blocks are kept: 4 MiB.
-const BLOCKS: NonZero<usize> = NonZero::new(64).unwrap();
+/// So many blocks of each plane are kept: 2 MiB.
+const BLOCKS: NonZero<usize> = NonZero::new(32).unwrap();
 
 /// Controls and samples of the finest level.
 pub(super) struct StoredGround<'a> {
     samples: &'a SamplePlane,
     cage: &'a ControlPlane,
-    kept: Mutex<LruCache<Key, Arc<Vec<i32>>>>,
+    kept_samples: Kept<Samples>,
+    kept_controls: Kept<Vec<i32>>,
     /// The first error: who lays features cannot be told at once.
     failed: Mutex<Option<PyramidError>>,
 }
-
-/// Which plane, and which block of it.
-type Key = (bool, usize);
 
 impl<'a> StoredGround<'a> {
     pub(super) fn new(samples: &'a SamplePlane, cage: &'a ControlPlane) -> Self {
         Self {
             samples,
             cage,
-            kept: Mutex::new(LruCache::new(BLOCKS)),
+            kept_samples: Kept::new(samples.size()),
+            kept_controls: Kept::new(cage.size()),
             failed: Mutex::new(None),
         }
     }
@@ -43,50 +43,82 @@ impl<'a> StoredGround<'a> {
         failed.take().map_or(Ok(()), Err)
     }
 
-    fn number(&self, is_sample: bool, row: usize, column: usize) -> i32 {
-        let size = if is_sample {
-            self.samples.size()
-        } else {
-            self.cage.size()
-        };
-        let blocks = Blocks::new(size, SIDE);
-        let [rows, columns] = blocks.shape();
-        let index = (row / SIDE).min(rows - 1) * columns + (column / SIDE).min(columns - 1);
-        let area = blocks.area(index);
-        let place = Area::new(row..row + 1, column..column + 1);
-        let [down, across] = area.offset_of(&place);
-        match self.block((is_sample, index), &area) {
-            Ok(block) => block[down * area.size()[1] + across],
+    fn at_sample<T: Default>(
+        &self,
+        [row, column]: [u32; 2],
+        of: impl Fn(&Samples, usize) -> T,
+    ) -> T {
+        let place = [row as usize, column as usize];
+        let found = self.kept_samples.at(place, |area| self.samples.read(area));
+        self.answer(found, of)
+    }
+
+    /// What a block says of one of its places; nothing where it could not be read.
+    fn answer<B, T: Default>(
+        &self,
+        found: Result<(Arc<B>, usize), PyramidError>,
+        of: impl Fn(&B, usize) -> T,
+    ) -> T {
+        match found {
+            Ok((block, index)) => of(&block, index),
             Err(error) => {
                 let mut failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner);
                 failed.get_or_insert(error);
-                0
+                T::default()
             }
         }
-    }
-
-    fn block(&self, key: Key, area: &Area) -> Result<Arc<Vec<i32>>, PyramidError> {
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(block) = kept.get(&key) {
-            return Ok(block.clone());
-        }
-        let block = Arc::new(if key.0 {
-            self.samples.read(area)?.values
-        } else {
-            self.cage.read(area)?
-        });
-        kept.put(key, block.clone());
-        Ok(block)
     }
 }
 
 impl Ground for StoredGround<'_> {
     fn control(&self, row: i64, column: i64) -> i32 {
-        let [row, column] = [row, column].map(|at| usize::try_from(at + 1).unwrap_or(0));
-        self.number(false, row, column)
+        let place = [row, column].map(|at| usize::try_from(at + 1).unwrap_or(0));
+        let found = self.kept_controls.at(place, |area| self.cage.read(area));
+        self.answer(found, |block, index| block[index])
     }
 
     fn sample(&self, row: u32, column: u32) -> i32 {
-        self.number(true, row as usize, column as usize)
+        self.at_sample([row, column], |block, index| block.values[index])
+    }
+
+    fn is_void(&self, row: u32, column: u32) -> bool {
+        self.at_sample([row, column], |block, index| {
+            block.is_void(index / block.columns, index % block.columns)
+        })
+    }
+}
+
+/// Blocks of a plane that were read last.
+struct Kept<B> {
+    blocks: Blocks,
+    read: Mutex<LruCache<usize, Arc<B>>>,
+}
+
+impl<B> Kept<B> {
+    fn new(size: [usize; 2]) -> Self {
+        Self {
+            blocks: Blocks::new(size, SIDE),
+            read: Mutex::new(LruCache::new(BLOCKS)),
+        }
+    }
+
+    /// The block that holds a place, and the place's index in it.
+    fn at(
+        &self,
+        [row, column]: [usize; 2],
+        read: impl FnOnce(&Area) -> Result<B, PyramidError>,
+    ) -> Result<(Arc<B>, usize), PyramidError> {
+        let [rows, columns] = self.blocks.shape();
+        let index = (row / SIDE).min(rows - 1) * columns + (column / SIDE).min(columns - 1);
+        let area = self.blocks.area(index);
+        let [down, across] = area.offset_of(&Area::new(row..row + 1, column..column + 1));
+        let place = down * area.size()[1] + across;
+        let mut kept = self.read.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(block) = kept.get(&index) {
+            return Ok((block.clone(), place));
+        }
+        let block = Arc::new(read(&area)?);
+        kept.put(index, block.clone());
+        Ok((block, place))
     }
 }

@@ -1,7 +1,10 @@
 //! Laying: an authored cage becomes a cut in the finest level's patches and the cage that fills it.
 //!
-//! 1. place the cage's vertices in samples and units;  2. find the cut around them;  3. put the rim on the ground;
-//! 4. lattice quads, zipper and authored faces become one cage;  5. measure how far it is from the ground.
+//! 1. place the cage's vertices in samples and units;
+//! 2. find the cut around them;
+//! 3. put the rim on the ground, which must not be void there;
+//! 4. lattice quads, zipper and authored faces become one cage;
+//! 5. measure how far it is from the ground.
 
 use super::plan::{self, PLAN_STEPS, Point};
 use super::region::Region;
@@ -10,6 +13,7 @@ use super::{CUT_PATCH_LIMIT, FEATURE_FACE_LIMIT, FeatureInput, LaidFeature, Site
 use crate::cage::{Cage, Faces, Tags, boundary_loops};
 use crate::geo::{QUAD_SAMPLES, TILE_QUADS, WorldFrame};
 use crate::pyramid::PyramidError;
+use crate::pyramid::surface::CONTROL_LIMIT;
 
 /// Samples a side of a patch.
 const SIDE: f64 = QUAD_SAMPLES as f64;
@@ -20,7 +24,7 @@ const MARGIN: i64 = 3;
 ///
 /// # Errors
 /// [`PyramidError::Refused`], with the feature's name, where the cage has no rim or several, its rim crosses itself or
-/// faces down, it reaches past the data, or it is too large.
+/// faces down, it reaches past the data, its rim is over void samples, or it is too large or too high.
 pub fn lay(input: &FeatureInput, site: &Site<'_>) -> Result<LaidFeature, PyramidError> {
     let refuse = |what: String| PyramidError::Refused(format!("feature {}: {what}", input.name));
     let rim = rim(&input.cage).map_err(refuse)?;
@@ -124,6 +128,30 @@ fn whole(x: f64) -> i64 {
     x as i64
 }
 
+/// Refuses rims with vertices over void samples: there is nothing to put them on.
+fn check_ground(plan: &[Point], cut: [u32; 4], site: &Site<'_>) -> Result<(), String> {
+    let [first_row, first_column] = [cut[0], cut[1]].map(|first| f64::from(first) * SIDE);
+    let place = |&[x, y]: &Point| {
+        [
+            first_row - y as f64 / PLAN_STEPS,
+            first_column + x as f64 / PLAN_STEPS,
+        ]
+    };
+    let mut voids = plan
+        .iter()
+        .map(place)
+        .filter(|&[row, column]| site.is_void(row, column));
+    let Some([row, column]) = voids.next() else {
+        return Ok(());
+    };
+    let [x, y] = site.grid.position(row, column);
+    Err(format!(
+        "there is no ground under {} of the {} vertices of its rim, first at coordinates {x}, {y}: samples are void there",
+        1 + voids.count(),
+        plan.len()
+    ))
+}
+
 /// Puts the cage together.
 fn laid(
     input: &FeatureInput,
@@ -142,6 +170,7 @@ fn laid(
         .map(|&vertex| snapped(relative[vertex as usize]))
         .collect();
     check_rim(&plan, rim)?;
+    check_ground(&plan, cut, site)?;
     let mut layer = Layer::new(*site, cut);
     let region = Region::new(layer.size, &plan);
     layer.add_lattice(&region);
@@ -310,6 +339,14 @@ impl<'a> Layer<'a> {
                 error = error.max((position[2] - ground).abs() * self.site.unit);
                 range = [range[0].min(position[2]), range[1].max(position[2])];
             }
+        }
+        let limit = f64::from(CONTROL_LIMIT);
+        if !range.iter().all(|z| z.abs() < limit) {
+            let [low, high, limit] = [range[0], range[1], limit].map(|z| z * self.site.unit);
+            return Err(format!(
+                "it reaches from {low} to {high} m of height; with units of {} m heights are smaller than {limit} m",
+                self.site.unit
+            ));
         }
         let cage = Cage::new(self.positions, self.faces, &self.tags)
             .map_err(|error| format!("with the ground around it: {error}"))?;

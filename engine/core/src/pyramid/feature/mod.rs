@@ -95,6 +95,9 @@ pub trait Ground {
 
     /// The stored height of a finest sample, in units.
     fn sample(&self, row: u32, column: u32) -> i32;
+
+    /// True for a finest sample that is void.
+    fn is_void(&self, row: u32, column: u32) -> bool;
 }
 
 /// Where features are laid.
@@ -126,6 +129,18 @@ impl Site<'_> {
             let ne = sample(north, east);
             nw + (ne - nw) * right + (se - ne) * down
         }
+    }
+
+    /// True where a void sample has a part in the height at a row and column of finest samples.
+    #[must_use]
+    pub fn is_void(&self, row: f64, column: f64) -> bool {
+        let (rows, down) = cell(row, self.grid.rows);
+        let (columns, right) = cell(column, self.grid.columns);
+        let (south, east) = (usize::from(down > 0.0), usize::from(right > 0.0));
+        rows[..=south].iter().any(|&row| {
+            let mut columns = columns[..=east].iter();
+            columns.any(|&column| self.ground.is_void(row, column))
+        })
     }
 }
 

@@ -15,7 +15,15 @@ impl Ground for Waves {
     fn sample(&self, row: u32, column: u32) -> i32 {
         wave(i64::from(row), i64::from(column))
     }
+
+    /// One far from all others.
+    fn is_void(&self, row: u32, column: u32) -> bool {
+        [row, column] == VOID
+    }
 }
+
+/// The void sample of [`Waves`]: row and column.
+pub(super) const VOID: [u32; 2] = [350, 500];
 
 fn wave(row: i64, column: i64) -> i32 {
     let height = 3.0 * column as f64 + 40.0 * (row as f64 / 17.0).sin();

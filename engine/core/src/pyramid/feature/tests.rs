@@ -5,7 +5,7 @@
     reason = "places and counts of small cuts"
 )]
 
-use super::testing::{Waves, at, sheet, with_site};
+use super::testing::{VOID, Waves, at, sheet, with_site};
 use super::*;
 use crate::cage::generate::{Arch, Cliff, Path, arch, cliff, flat};
 use crate::cage::{Corner, Crease, Faces, Tags, boundary_loops};
@@ -233,6 +233,23 @@ fn what_cannot_be_laid_is_refused_with_its_reason() {
     );
     let huge = refused(&at(sheet(1e9, 5), 70.0, 75.0));
     assert!(huge.contains("past the data"), "{huge}");
+    let void = refused(&at(sheet(100.0, 5), 351.0, 505.5));
+    assert!(
+        void.contains("no ground under 1 of the 20 vertices of its rim, first at coordinates"),
+        "{void}"
+    );
+    // The void may be under what is authored, and in the lattice of its cut.
+    for column in [500.0, 512.0] {
+        let over = laid(&at(sheet(100.0, 5), 350.0, column)).unwrap();
+        assert!((4 * over.cut[1]..4 * over.cut[3]).contains(&VOID[1]));
+    }
+    let mut high = at(sheet(100.0, 5), 70.0, 75.0);
+    high.placement.height = Some(f64::from(1 << 24));
+    let high = refused(&high);
+    assert!(
+        high.contains("heights are smaller than 16777216 m"),
+        "{high}"
+    );
     let closed: Faces = [[0, 1, 2], [0, 2, 1]].into_iter().collect();
     let closed = Cage::new(
         vec![[0.0; 3], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0]],

@@ -17,7 +17,9 @@ fn ground() -> RefineGround {
 
 /// Corners, sides and the middle of every piece.
 fn sites(tables: &Tables) -> Vec<RefineSite> {
-    let patches = (0..).take(tables.render.patches.len()).map(PieceIndex::Patch);
+    let patches = (0..)
+        .take(tables.render.patches.len())
+        .map(PieceIndex::Patch);
     let caps = (0..).take(tables.render.caps.len()).map(PieceIndex::Cap);
     let places = [[0.0, 0.0], [1.0, 1.0], [0.5, 0.0], [0.25, 0.625]];
     let mut sites = Vec::new();
