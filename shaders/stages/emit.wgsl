@@ -123,66 +123,69 @@ fn put(a: u32, b: u32, c: u32, is_hidden: bool) {
     at += 3u;
 }
 
-// A triangle of samples (row, column), in one point when a corner is void.
-fn triangle(a: vec2u, b: vec2u, c: vec2u) {
-    put(owned_vertex(tile, a.x, a.y), owned_vertex(tile, b.x, b.y), owned_vertex(tile, c.x, c.y),
-        is_void(a) || is_void(b) || is_void(c));
+// A vertex of a triangle.
+struct Corner {
+    vertex: u32,
+    is_void: bool,
 }
 
-// A cell from its north-west sample, with its split edges.
+fn corner(sample: vec2u) -> Corner {
+    return Corner(owned_vertex(tile, sample.x, sample.y), is_void(sample));
+}
+
+// A place on the border of a cell, in half cells from its north-west sample:
+//
+//   0 7 6      Place 8 is 0 again. Odd places are the middles of the edges,
+//   1   5      west, south, east, north.
+//   2 3 4
+fn cell_place(place: u32) -> vec2u {
+    return vec2u(clamp(3 - abs(i32(place) - vec2i(3, 5)), vec2i(0), vec2i(2)));
+}
+
+// A cell from its north-west sample, with its split edges: a fan over its border, about its centre where an edge is split,
+// else about its north-west sample. In one loop, for a driver compiles as many copies of a function as there are calls.
 fn cell(nw: vec2u, stride: u32, split: u32) {
-    let sw = nw + vec2u(stride, 0u);
-    let se = nw + stride;
-    let ne = nw + vec2u(0u, stride);
-    if split == 0u {
-        triangle(nw, sw, se);
-        triangle(nw, se, ne);
-        return;
-    }
-    let centre = nw + stride / 2u;
-    fan_side(centre, nw, sw, (split & EDGE_WEST) != 0u);
-    fan_side(centre, sw, se, (split & EDGE_SOUTH) != 0u);
-    fan_side(centre, se, ne, (split & EDGE_EAST) != 0u);
-    fan_side(centre, ne, nw, (split & EDGE_NORTH) != 0u);
-}
-
-fn fan_side(centre: vec2u, a: vec2u, b: vec2u, is_split: bool) {
-    if is_split {
-        let middle = (a + b) / 2u;
-        triangle(centre, a, middle);
-        triangle(centre, middle, b);
-    } else {
-        triangle(centre, a, b);
+    let is_split = split != 0u;
+    let first = select(2u, 0u, is_split);
+    let last = select(6u, 8u, is_split);
+    let pivot = corner(nw + select(0u, stride / 2u, is_split));
+    var before = pivot;
+    for (var place = first; place <= last; place++) {
+        if place % 2u == 0u || (split & (EDGE_WEST >> (place / 2u))) != 0u {
+            let next = corner(nw + cell_place(place) * stride / 2u);
+            if place > first {
+                put(pivot.vertex, before.vertex, next.vertex, pivot.is_void || before.is_void || next.is_void);
+            }
+            before = next;
+        }
     }
 }
 
+// True when cells are drawn in fours: at the finest depth, beside a coarser tile.
+fn is_in_fours(word: u32, shift: u32) -> bool {
+    return word_depth(word, shift) == FINEST_DEPTH && word_coarser(word) != 0u;
+}
+
+// Squares of one cell, or in fours: as one split cell where an edge faces a coarser tile, which keeps no middle there,
+// else as four.
 fn surface(patch_index: u32, word: u32, shift: u32) {
     let nw = vec2u(patch_index / TILE_QUADS, patch_index % TILE_QUADS) * QUAD_SAMPLES;
-    let depth = word_depth(word, shift);
-    if depth == FINEST_DEPTH && word_coarser(word) != 0u {
-        for (var block = 0u; block < 4u; block++) {
-            let whole = outer_edges(block / 2u, block % 2u, 2u) & word_coarser(word);
-            block_of_four(nw + 2u * vec2u(block / 2u, block % 2u), whole);
-        }
-        return;
-    }
-    let count = 1u << depth;
-    let stride = QUAD_SAMPLES >> depth;
+    let in_fours = is_in_fours(word, shift);
+    let count = select(1u << word_depth(word, shift), 2u, in_fours);
+    let stride = QUAD_SAMPLES / count;
     for (var i = 0u; i < count * count; i++) {
         let place = vec2u(i / count, i % count);
-        let split = outer_edges(place.x, place.y, count) & word_split(word, shift);
-        cell(nw + place * stride, stride, split);
-    }
-}
-
-// 2 x 2 cells of depth 2; `whole` edges, towards a coarser tile, keep no middle.
-fn block_of_four(nw: vec2u, whole: u32) {
-    if whole != 0u {
-        cell(nw, 2u, 15u ^ whole);
-        return;
-    }
-    for (var i = 0u; i < 4u; i++) {
-        cell(nw + vec2u(i / 2u, i % 2u), 1u, 0u);
+        let outer = outer_edges(place.x, place.y, count);
+        var split = outer & word_split(word, shift);
+        var parts = 1u;
+        if in_fours {
+            let whole = outer & word_coarser(word);
+            split = select(15u ^ whole, 0u, whole == 0u);
+            parts = select(1u, 2u, whole == 0u);
+        }
+        for (var j = 0u; j < parts * parts; j++) {
+            cell(nw + place * stride + vec2u(j / parts, j % parts), stride / parts, split);
+        }
     }
 }
 
@@ -200,24 +203,22 @@ fn skirt_start(patch_index: u32, edge: u32) -> u32 {
 
 fn skirt(patch_index: u32, edge: u32, stride: u32) {
     let start = skirt_start(patch_index, edge);
-    for (var i = 0u; i < QUAD_SAMPLES; i += stride) {
-        let next = (start + i + stride) % SKIRT_VERTICES;
-        let a = skirt_sample(start + i);
-        let b = skirt_sample(next);
-        let top_a = owned_vertex(tile, a.x, a.y);
-        let top_b = owned_vertex(tile, b.x, b.y);
-        let low_a = (tile << SAMPLE_BITS) | (SKIRT_FIRST + start + i);
-        let low_b = (tile << SAMPLE_BITS) | (SKIRT_FIRST + next);
-        let is_hidden = is_void(a) || is_void(b);
-        put(top_b, low_b, low_a, is_hidden);
-        put(top_b, low_a, top_a, is_hidden);
+    var before = corner(skirt_sample(start));
+    for (var place = start; place < start + QUAD_SAMPLES; place += stride) {
+        let next_place = (place + stride) % SKIRT_VERTICES;
+        let next = corner(skirt_sample(next_place));
+        let low_before = (tile << SAMPLE_BITS) | (SKIRT_FIRST + place);
+        let low_next = (tile << SAMPLE_BITS) | (SKIRT_FIRST + next_place);
+        let is_hidden = before.is_void || next.is_void;
+        put(next.vertex, low_next, low_before, is_hidden);
+        put(next.vertex, low_before, before.vertex, is_hidden);
+        before = next;
     }
 }
 
 // Triangles of a template: split edges, or fours beside a coarser tile.
 fn is_transition(word: u32, shift: u32) -> bool {
-    let is_beside_coarser = word_depth(word, shift) == FINEST_DEPTH && word_coarser(word) != 0u;
-    return word_split(word, shift) != 0u || is_beside_coarser;
+    return word_split(word, shift) != 0u || is_in_fours(word, shift);
 }
 
 fn write_patch(patch_index: u32, word: u32, shift: u32) {

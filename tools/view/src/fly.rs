@@ -19,14 +19,16 @@ use crate::{
     depth_frames,
     frames::{FrameWriter, Wanted},
     path::{self, Path},
-    report::{About, FrameRow, Report},
+    report::{About, FrameRow, Report, Start},
     scene::{Debug, Scene},
+    stopwatch::{Span, Stopwatch, millis},
 };
 
 /// Frames after the last one in which its late numbers come back from the device.
 const LATE_FRAMES: usize = 4;
 
-pub(crate) fn run(arguments: &FlyArguments) -> Result<Outcome> {
+/// Flies; `process_start` is where the wait for the first picture is counted from.
+pub(crate) fn run(arguments: &FlyArguments, process_start: Instant) -> Result<Outcome> {
     let data = DataSet::open(&arguments.terrain.pyramid)?;
     let keys = data.keys(arguments.terrain.path.as_deref())?;
     if let Some(file) = &arguments.save_path {
@@ -34,7 +36,8 @@ pub(crate) fn run(arguments: &FlyArguments) -> Result<Outcome> {
             .with_context(|| format!("{}: writing failed", file.display()))?;
     }
     let path = Path::new(&keys, &data.frame())?;
-    let mut flight = Flight::new(arguments, &data, frame_count(&path, arguments.fps))?;
+    let count = frame_count(&path, arguments.fps);
+    let mut flight = Flight::new(arguments, &data, count, process_start)?;
     match arguments.mode {
         Mode::Stepped => flight.stepped(&path)?,
         Mode::Paced => flight.paced(&path)?,
@@ -62,6 +65,8 @@ fn pace(arguments: &FlyArguments) -> Pace {
 /// A flight under way.
 struct Flight<'a> {
     arguments: &'a FlyArguments,
+    process_start: Instant,
+    start: Start,
     headless: Headless,
     offscreen: Offscreen,
     scene: Scene,
@@ -76,7 +81,12 @@ struct Flight<'a> {
 }
 
 impl<'a> Flight<'a> {
-    fn new(arguments: &'a FlyArguments, data: &DataSet, frame_count: u32) -> Result<Self> {
+    fn new(
+        arguments: &'a FlyArguments,
+        data: &DataSet,
+        frame_count: u32,
+        process_start: Instant,
+    ) -> Result<Self> {
         if let Some(folder) = &arguments.depth_frames {
             make_folder(folder)?;
         }
@@ -85,7 +95,12 @@ impl<'a> Flight<'a> {
             frames: arguments.frames.clone(),
             contact_sheet: arguments.contact_sheet.clone(),
         };
+        let before = Instant::now();
         let headless = Headless::new()?;
+        let start = Start {
+            device_millis: millis(before.elapsed()),
+            ..Start::default()
+        };
         let (device, queue) = (&headless.device, &headless.queue);
         let scene = Scene::open(
             data,
@@ -106,6 +121,8 @@ impl<'a> Flight<'a> {
             bytes_read: 0,
             last_view: None,
             arguments,
+            process_start,
+            start,
             headless,
             scene,
             frame_count,
@@ -151,14 +168,15 @@ impl<'a> Flight<'a> {
         let size = self.offscreen.size();
         let view = self.scene.view(camera, size, seconds);
         self.last_view = Some(view);
-        let start = Instant::now();
+        let mut watch = Stopwatch::start();
         self.scene.update(&view, Debug::of(&self.arguments.terrain));
-        let updated = start.elapsed();
+        let update = watch.lap();
         self.collect();
         let commands = self.encode();
-        let encoded = start.elapsed();
+        let encode = watch.lap();
         self.headless.queue.submit([commands]);
-        self.add_row(seconds, [updated, encoded - updated, start.elapsed()]);
+        self.add_row(seconds, [update, encode, watch.lap()]);
+        self.note_first_picture()?;
         self.cameras.push(camera, size);
         self.save(index)
     }
@@ -180,15 +198,12 @@ impl<'a> Flight<'a> {
         encoder.finish()
     }
 
-    fn add_row(&mut self, t: f64, [update, encode, total]: [Duration; 3]) {
+    fn add_row(&mut self, t: f64, spans: [Span; 3]) {
         let report = self.scene.report();
         let stats = &report.stats;
-        let millis = |span: Duration| 1000.0 * span.as_secs_f64();
         self.rows.push(FrameRow {
             t,
-            cpu_update_millis: millis(update),
-            cpu_encode_millis: millis(encode),
-            cpu_total_millis: millis(total),
+            tiles_resident: stats.slots_used.into(),
             tiles_drawn: stats.tiles_drawn as u64,
             tiles_missing: stats.tiles_missing as u64,
             missing_share: stats.missing_share,
@@ -197,10 +212,21 @@ impl<'a> Flight<'a> {
             ram_bytes: stats.ram_bytes,
             vram_bytes: report.vram_bytes,
             error_px: stats.tolerance_px,
-            ..FrameRow::default()
+            ..FrameRow::timed(spans)
         });
         self.bytes_read = stats.bytes_read;
         self.frame_numbers.push(self.scene.frame_number());
+    }
+
+    /// Waits for the first frame with terrain, once a flight, and says when it was there.
+    fn note_first_picture(&mut self) -> Result<()> {
+        let has_terrain = self.scene.report().stats.tiles_drawn > 0;
+        if self.start.first_picture_millis.is_none() && has_terrain {
+            self.headless.finish()?;
+            let since = millis(self.process_start.elapsed());
+            self.start.first_picture_millis = Some(since - self.start.device_millis);
+        }
+        Ok(())
     }
 
     /// Reads the pictures back, where they are wanted.
@@ -273,6 +299,7 @@ impl<'a> Flight<'a> {
             commit: env!("DRUMLIN_COMMIT"),
             data_set: data.describe(),
             settings: serde_json::to_value(self.arguments)?,
+            start: self.start,
         })
     }
 }

@@ -15,10 +15,11 @@ mod report;
 mod scene;
 mod screen;
 mod sky;
+mod stopwatch;
 mod view;
 mod viewer;
 
-use std::{error::Error, process::ExitCode};
+use std::{error::Error, process::ExitCode, time::Instant};
 
 use drumlin::RenderError;
 use drumlin_terminal::{outcome::Outcome, usage};
@@ -26,13 +27,14 @@ use drumlin_terminal::{outcome::Outcome, usage};
 use crate::arguments::{Arguments, Verb};
 
 fn main() -> ExitCode {
+    let start = Instant::now();
     let arguments: Arguments = match usage::parse(std::env::args_os()) {
         Ok(arguments) => arguments,
         Err(code) => return code,
     };
     let outcome = match arguments.verb {
         Verb::Adapter => adapter::run(),
-        Verb::Fly(arguments) => fly::run(&arguments),
+        Verb::Fly(arguments) => fly::run(&arguments, start),
         Verb::View(arguments) => view::run(arguments),
     };
     outcome

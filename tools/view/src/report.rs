@@ -6,6 +6,8 @@ use anyhow::{Context, Result};
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::stopwatch::{Span, millis};
+
 /// Said once a flight.
 #[derive(Debug, Serialize)]
 pub(crate) struct About {
@@ -19,6 +21,17 @@ pub(crate) struct About {
     pub(crate) data_set: Value,
     /// What was asked for.
     pub(crate) settings: Value,
+    /// How it began.
+    pub(crate) start: Start,
+}
+
+/// From the process's start to the first picture, milliseconds by the wall clock.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub(crate) struct Start {
+    /// Making the device: the driver's own work.
+    pub(crate) device_millis: f64,
+    /// Everything else, until the device had finished the first frame that shows terrain; null where none does.
+    pub(crate) first_picture_millis: Option<f64>,
 }
 
 /// Patches drawn, by depth; `regular` have no finer neighbour, `transition` have.
@@ -33,13 +46,22 @@ pub(crate) struct PatchCounts {
 pub(crate) struct FrameRow {
     /// Seconds after the first key.
     pub(crate) t: f64,
+    /// Work of the frame's own thread.
     pub(crate) cpu_update_millis: f64,
     pub(crate) cpu_encode_millis: f64,
+    pub(crate) cpu_submit_millis: f64,
     pub(crate) cpu_total_millis: f64,
+    /// The same by the clock on the wall: with the turns of other threads, a software driver's among them.
+    pub(crate) wall_update_millis: f64,
+    pub(crate) wall_encode_millis: f64,
+    pub(crate) wall_submit_millis: f64,
+    pub(crate) wall_total_millis: f64,
     /// Null where the adapter has no timestamps.
     pub(crate) gpu_millis: Option<f64>,
     /// The part of it in which tables of features are executed; null where none arrived.
     pub(crate) gpu_refine_millis: Option<f64>,
+    /// Tiles in the pool, ready to be drawn.
+    pub(crate) tiles_resident: u64,
     pub(crate) tiles_drawn: u64,
     pub(crate) patches: PatchCounts,
     pub(crate) triangles: u64,
@@ -82,6 +104,34 @@ struct Totals {
     bytes_uploaded: u64,
 }
 
+impl Start {
+    fn line(self) -> String {
+        let device = self.device_millis;
+        self.first_picture_millis.map_or_else(String::new, |first| {
+            format!("first picture after {first:.0} ms, beside {device:.0} ms for the device\n")
+        })
+    }
+}
+
+impl FrameRow {
+    /// The row of a frame whose update, encoding and submission took so long.
+    pub(crate) fn timed(spans: [Span; 3]) -> Self {
+        let [update, encode, submit] = spans;
+        let total: Span = spans.into_iter().sum();
+        Self {
+            cpu_update_millis: millis(update.cpu),
+            cpu_encode_millis: millis(encode.cpu),
+            cpu_submit_millis: millis(submit.cpu),
+            cpu_total_millis: millis(total.cpu),
+            wall_update_millis: millis(update.wall),
+            wall_encode_millis: millis(encode.wall),
+            wall_submit_millis: millis(submit.wall),
+            wall_total_millis: millis(total.wall),
+            ..Self::default()
+        }
+    }
+}
+
 impl Report {
     /// Works the frames up.
     pub(crate) fn new(about: About, frames: Vec<FrameRow>) -> Result<Self> {
@@ -111,24 +161,27 @@ impl Report {
         let line = |(name, title): (&str, &str)| {
             let spread = self.summary.get(name)?;
             let [p50, p95, p99, max] = [spread.p50, spread.p95, spread.p99, spread.max].map(short);
-            Some(format!("{title:<24}{p50:>12}{p95:>12}{p99:>12}{max:>12}\n"))
+            Some(format!("{title:<26}{p50:>12}{p95:>12}{p99:>12}{max:>12}\n"))
         };
         let rows = [
             ("cpu_update_millis", "CPU update, ms"),
             ("cpu_encode_millis", "CPU encode, ms"),
+            ("cpu_submit_millis", "CPU submit, ms"),
             ("cpu_total_millis", "CPU total, ms"),
+            ("wall_total_millis", "the same by the clock, ms"),
             ("gpu_millis", "GPU, ms"),
             ("gpu_refine_millis", "GPU refine, ms"),
+            ("tiles_resident", "tiles resident"),
             ("tiles_drawn", "tiles drawn"),
             ("triangles", "triangles"),
             ("tiles_missing", "tiles missing"),
             ("vram_bytes", "VRAM, bytes"),
         ];
         let head = format!(
-            "{:<24}{:>12}{:>12}{:>12}{:>12}\n",
+            "{:<26}{:>12}{:>12}{:>12}{:>12}\n",
             "", "p50", "p95", "p99", "max"
         );
-        head + &rows.into_iter().filter_map(line).collect::<String>()
+        head + &rows.into_iter().filter_map(line).collect::<String>() + &self.about.start.line()
     }
 }
 

@@ -109,6 +109,13 @@ pub fn chosen_shift(frame: &Frame, draw_list: &[u32]) -> u32 {
         .unwrap_or(SHIFT_COUNT)
 }
 
+/// A vertex of a triangle.
+#[derive(Clone, Copy)]
+struct Corner {
+    vertex: u32,
+    is_void: bool,
+}
+
 /// A patch being written.
 struct Writer<'a> {
     frame: &'a Frame,
@@ -129,8 +136,11 @@ impl Writer<'_> {
             && pool_void(self.pages, drawn.slot, sample[0] * TILE_SAMPLES + sample[1])
     }
 
-    fn vertex(&self, sample: [u32; 2]) -> u32 {
-        owned_vertex(self.tiles, self.tile, sample[0], sample[1])
+    fn corner(&self, sample: [u32; 2]) -> Corner {
+        Corner {
+            vertex: owned_vertex(self.tiles, self.tile, sample[0], sample[1]),
+            is_void: self.is_void(sample),
+        }
     }
 
     fn put(&mut self, [a, b, c]: [u32; 3], is_hidden: bool) {
@@ -139,87 +149,69 @@ impl Writer<'_> {
         self.at += 3;
     }
 
-    /// A triangle of samples (row, column), in one point when a corner is void.
-    fn triangle(&mut self, corners: [[u32; 2]; 3]) {
-        let is_hidden = corners.iter().any(|&sample| self.is_void(sample));
-        self.put(corners.map(|sample| self.vertex(sample)), is_hidden);
-    }
-
-    /// A cell from its north-west sample, with its split edges.
+    /// A cell from its north-west sample, with its split edges: a fan over its border, about its centre where an edge is
+    /// split, else about its north-west sample.
     fn cell(&mut self, nw: [u32; 2], stride: u32, split: u32) {
-        let sw = [nw[0] + stride, nw[1]];
-        let se = [nw[0] + stride, nw[1] + stride];
-        let ne = [nw[0], nw[1] + stride];
-        if split == 0 {
-            self.triangle([nw, sw, se]);
-            self.triangle([nw, se, ne]);
-            return;
-        }
-        let centre = [nw[0] + stride / 2, nw[1] + stride / 2];
-        self.fan_side(centre, nw, sw, split & EDGE_WEST != 0);
-        self.fan_side(centre, sw, se, split & EDGE_SOUTH != 0);
-        self.fan_side(centre, se, ne, split & EDGE_EAST != 0);
-        self.fan_side(centre, ne, nw, split & EDGE_NORTH != 0);
-    }
-
-    fn fan_side(&mut self, centre: [u32; 2], a: [u32; 2], b: [u32; 2], is_split: bool) {
-        if is_split {
-            let middle = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2];
-            self.triangle([centre, a, middle]);
-            self.triangle([centre, middle, b]);
+        let (first, last, middle) = if split == 0 {
+            (2, 6, 0)
         } else {
-            self.triangle([centre, a, b]);
+            (0, 8, stride / 2)
+        };
+        let pivot = self.corner(nw.map(|at| at + middle));
+        let mut before = pivot;
+        for place in first..=last {
+            if place % 2 == 0 || split & (EDGE_WEST >> (place / 2)) != 0 {
+                let [row, column] = cell_place(place);
+                let next = self.corner([nw[0] + row * stride / 2, nw[1] + column * stride / 2]);
+                if place > first {
+                    let corners = [pivot, before, next];
+                    let is_hidden = corners.iter().any(|corner| corner.is_void);
+                    self.put(corners.map(|corner| corner.vertex), is_hidden);
+                }
+                before = next;
+            }
         }
     }
 
+    /// Squares of one cell, or in fours: as one split cell where an edge faces a coarser tile, which keeps no middle
+    /// there, else as four.
     fn surface(&mut self, patch: u32, word: u32, shift: u32) {
-        let nw = [
-            patch / TILE_QUADS * QUAD_SAMPLES,
-            patch % TILE_QUADS * QUAD_SAMPLES,
-        ];
-        let depth = word_depth(word, shift);
-        if depth == FINEST_DEPTH && word_coarser(word) != 0 {
-            for block in 0..4 {
-                let whole = outer_edges(block / 2, block % 2, 2) & word_coarser(word);
-                self.block_of_four([nw[0] + block / 2 * 2, nw[1] + block % 2 * 2], whole);
-            }
-            return;
-        }
-        let count = 1 << depth;
-        let stride = QUAD_SAMPLES >> depth;
+        let nw = [patch / TILE_QUADS, patch % TILE_QUADS].map(|at| at * QUAD_SAMPLES);
+        let in_fours = is_in_fours(word, shift);
+        let count = if in_fours {
+            2
+        } else {
+            1 << word_depth(word, shift)
+        };
+        let stride = QUAD_SAMPLES / count;
         for i in 0..count * count {
             let place = [i / count, i % count];
-            let split = outer_edges(place[0], place[1], count) & word_split(word, shift);
-            self.cell(
-                [nw[0] + place[0] * stride, nw[1] + place[1] * stride],
-                stride,
-                split,
-            );
-        }
-    }
-
-    /// 2 × 2 cells of depth 2; `whole` edges, towards a coarser tile, keep no middle.
-    fn block_of_four(&mut self, nw: [u32; 2], whole: u32) {
-        if whole != 0 {
-            self.cell(nw, 2, 15 ^ whole);
-            return;
-        }
-        for i in 0..4 {
-            self.cell([nw[0] + i / 2, nw[1] + i % 2], 1, 0);
+            let outer = outer_edges(place[0], place[1], count);
+            let (mut split, mut parts) = (outer & word_split(word, shift), 1);
+            if in_fours {
+                let whole = outer & word_coarser(word);
+                (split, parts) = if whole == 0 { (0, 2) } else { (15 ^ whole, 1) };
+            }
+            for j in 0..parts * parts {
+                let part = [j / parts, j % parts];
+                let corner = [0, 1].map(|axis| nw[axis] + place[axis] * stride + part[axis]);
+                self.cell(corner, stride / parts, split);
+            }
         }
     }
 
     fn skirt(&mut self, patch: u32, edge: u32, stride: u32) {
         let start = skirt_start(patch, edge);
+        let mut before = self.corner(skirt_sample(start));
         for place in (start..start + QUAD_SAMPLES).step_by(stride as usize) {
-            let next = (place + stride) % SKIRT_VERTICES;
-            let (a, b) = (skirt_sample(place), skirt_sample(next));
-            let (top_a, top_b) = (self.vertex(a), self.vertex(b));
-            let low_a = self.tile << SAMPLE_BITS | (SKIRT_FIRST + place);
-            let low_b = self.tile << SAMPLE_BITS | (SKIRT_FIRST + next);
-            let is_hidden = self.is_void(a) || self.is_void(b);
-            self.put([top_b, low_b, low_a], is_hidden);
-            self.put([top_b, low_a, top_a], is_hidden);
+            let next_place = (place + stride) % SKIRT_VERTICES;
+            let next = self.corner(skirt_sample(next_place));
+            let low_before = self.tile << SAMPLE_BITS | (SKIRT_FIRST + place);
+            let low_next = self.tile << SAMPLE_BITS | (SKIRT_FIRST + next_place);
+            let is_hidden = before.is_void || next.is_void;
+            self.put([next.vertex, low_next, low_before], is_hidden);
+            self.put([next.vertex, low_before, before.vertex], is_hidden);
+            before = next;
         }
     }
 
@@ -234,10 +226,25 @@ impl Writer<'_> {
     }
 }
 
+/// True when cells are drawn in fours: at the finest depth, beside a coarser tile.
+fn is_in_fours(word: u32, shift: u32) -> bool {
+    word_depth(word, shift) == FINEST_DEPTH && word_coarser(word) != 0
+}
+
 /// True where a patch has triangles of a template: split edges, or fours beside a coarser tile.
 fn is_transition(word: u32, shift: u32) -> bool {
-    let is_beside_coarser = word_depth(word, shift) == FINEST_DEPTH && word_coarser(word) != 0;
-    word_split(word, shift) != 0 || is_beside_coarser
+    word_split(word, shift) != 0 || is_in_fours(word, shift)
+}
+
+/// A place on the border of a cell, in half cells from its north-west sample:
+///
+/// ```text
+/// 0 7 6      Place 8 is 0 again. Odd places are the middles of the edges,
+/// 1   5      west, south, east, north.
+/// 2 3 4
+/// ```
+fn cell_place(place: u32) -> [u32; 2] {
+    [3, 5].map(|far: u32| 3_u32.saturating_sub(place.abs_diff(far)).min(2))
 }
 
 /// The first place, clockwise, of a patch's part of a side.
