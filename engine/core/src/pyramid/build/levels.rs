@@ -58,9 +58,17 @@ impl Levels {
         watch: &Watch<'_>,
     ) -> Result<Vec<LevelSamples>, PyramidError> {
         let advance = watch.stage(Stage::Read, u64::from(grid.rows));
-        let mut finest = sample::read_finest(raster, scale.unit(), &advance)?;
         let data = [grid.rows, grid.columns].map(|count| count as usize);
-        voids::fill(&mut finest, data)?;
+        let finest = sample::read_finest(raster, scale.unit(), &advance).and_then(|mut finest| {
+            voids::fill(&mut finest, data)?;
+            Ok(finest)
+        });
+        let mut finest = finest.map_err(|error| match error {
+            PyramidError::Unfit(what) => {
+                PyramidError::Unfit(format!("{}: {what}", raster.header().source.name))
+            }
+            other => other,
+        })?;
         finest.continue_past(data);
         let advance = watch.stage(Stage::Fit, 2 * u64::from(grid.level_count()));
         advance(1)?;

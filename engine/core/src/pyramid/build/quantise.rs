@@ -81,7 +81,7 @@ pub(super) fn is_key(level: u8) -> bool {
 /// Returns how many bytes the widest r takes.
 ///
 /// # Errors
-/// [`PyramidError::Refused`] where a control leaves the range of the 32-bit rule.
+/// [`PyramidError::Unfit`] where a control leaves the range of the 32-bit rule.
 pub(super) fn quantise(
     cage: &mut LevelCage,
     parent: Option<&LevelCage>,
@@ -109,7 +109,7 @@ pub(super) fn quantise(
         });
     let (width, control) = lines.reduce(|| (1, 0), |a, b| (a.0.max(b.0), a.1.max(b.1)));
     if control >= CONTROL_LIMIT.unsigned_abs() {
-        return Err(PyramidError::Refused(format!(
+        return Err(PyramidError::Unfit(format!(
             "a cage's control of {control} units is over the limit of 2^25; a greater error bound or unit allows it"
         )));
     }

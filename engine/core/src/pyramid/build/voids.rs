@@ -15,7 +15,7 @@ const SWEEPS: usize = 8;
 /// Fills the void samples of the first rows and columns of a level.
 ///
 /// # Errors
-/// [`PyramidError::Refused`] when all are void.
+/// [`PyramidError::Unfit`] when all are void.
 pub(super) fn fill(
     level: &mut LevelSamples,
     [rows, columns]: [usize; 2],
@@ -24,7 +24,7 @@ pub(super) fn fill(
         return Ok(());
     };
     if voids.count() == (rows * columns) as u64 {
-        return Err(PyramidError::Refused(format!(
+        return Err(PyramidError::Unfit(format!(
             "all {rows} x {columns} samples are void: there is no terrain"
         )));
     }
