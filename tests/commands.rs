@@ -5,7 +5,8 @@ use std::{fs, path::Path};
 use serde_json::Value;
 
 use crate::support::{
-    drumlin, drumlin_fails, drumlin_json, drumlin_ok, folder, rainier, rainier_pyramid, shared,
+    copy_tree, drumlin, drumlin_fails, drumlin_json, drumlin_ok, files, folder, rainier,
+    rainier_pyramid, shared,
 };
 
 /// Arguments of mixed kinds as one list.
@@ -90,32 +91,6 @@ fn info_tells_the_grid_the_crs_and_the_levels() {
 fn a_fresh_pyramid_is_valid_to_the_last_bit() {
     drumlin_ok(args!["validate", rainier_pyramid()]);
     drumlin_ok(args!["validate", rainier_pyramid(), "--deep"]);
-}
-
-fn copy_tree(from: &Path, to: &Path) {
-    fs::create_dir_all(to).expect("a folder can be made");
-    for entry in fs::read_dir(from).expect("the folder can be read") {
-        let path = entry.expect("the entry can be read").path();
-        let target = to.join(path.file_name().expect("an entry has a name"));
-        if path.is_dir() {
-            copy_tree(&path, &target);
-        } else {
-            fs::copy(&path, &target)
-                .map(|_| ())
-                .expect("a file can be copied");
-        }
-    }
-}
-
-fn files(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
-    for entry in fs::read_dir(folder).expect("the folder can be read") {
-        let path = entry.expect("the entry can be read").path();
-        if path.is_dir() {
-            files(&path, found);
-        } else {
-            found.push(path);
-        }
-    }
 }
 
 #[test]
@@ -279,6 +254,25 @@ fn bad_inputs_are_told_in_one_line_and_leave_nothing() {
     drumlin_fails(2, args!["height", rainier_pyramid(), "--at", "here"]);
     drumlin_fails_any(args!["info", &out.join("absent.zarr")], &[1, 3]);
     drumlin_fails_any(args!["info", &out], &[1]);
+}
+
+#[test]
+fn a_raster_without_a_height_and_one_too_high_are_invalid_and_named() {
+    let out = folder("unfit");
+    let target = out.join("out.zarr");
+    for (name, height, word) in [("void", f32::NAN, "void"), ("high", 1e8, "2^25")] {
+        let input = out.join(format!("{name}.tif"));
+        let file = fs::File::create(&input).expect("a file can be made");
+        tiff::encoder::TiffEncoder::new(file)
+            .and_then(|mut tiff| {
+                tiff.write_image::<tiff::encoder::colortype::Gray32Float>(3, 2, &[height; 6])
+            })
+            .expect("a TIFF");
+        let line = drumlin_fails(1, args!["build", &input, "-o", &target, "--spacing", "10"]);
+        let file = format!("{name}.tif");
+        assert!(line.contains(&file) && line.contains(word), "{line}");
+        assert!(!target.exists(), "something was left for {name}");
+    }
 }
 
 #[test]

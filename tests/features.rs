@@ -7,14 +7,18 @@ use drumlin::{
 };
 use drumlin_tests::scene::HillSource;
 
-use crate::support::{drumlin_ok, folder, rainier};
+use crate::{
+    picture,
+    support::{drumlin_ok, folder, rainier},
+};
 
 const SIZE: [u32; 2] = [640, 360];
 
 /// World x and y of the arch's middle; it spans 80 m from west to east.
 const ARCH: [f64; 2] = [-512.0, 886.0];
 
-fn terrain(gpu: &Headless) -> Terrain {
+/// A hill with the arch in it, which waits for its tiles.
+pub(crate) fn terrain(gpu: &Headless) -> Terrain {
     let source = Arc::new(HillSource::with_arch());
     let descriptor = TerrainDescriptor {
         pace: Pace::Complete,
@@ -43,16 +47,8 @@ fn draw(gpu: &Headless, terrain: &mut Terrain, name: &str, view: &View) -> (usiz
         .read_color(&gpu.device, &gpu.queue)
         .expect("a picture");
     gpu.finish().expect("no complaint");
-    save(name, &color);
+    picture::keep(name, SIZE, &color);
     (report.stats.features_drawn, distances)
-}
-
-/// Keeps a picture for a look at it, where `DRUMLIN_PICTURES` names a folder.
-fn save(name: &str, color: &[u8]) {
-    if let Some(folder) = std::env::var_os("DRUMLIN_PICTURES") {
-        let path = std::path::Path::new(&folder).join(name);
-        image::save_buffer(path, color, SIZE[0], SIZE[1], image::ColorType::Rgba8).expect("a PNG");
-    }
 }
 
 fn ground(terrain: &Terrain) -> f64 {
@@ -60,6 +56,13 @@ fn ground(terrain: &Terrain) -> f64 {
         .height_at([ARCH[0], ARCH[1] - 40.0])
         .expect("it can be read")
         .expect("ground")
+}
+
+/// From the south, low enough to see the sky under the arch.
+pub(crate) fn below_the_arch(terrain: &Terrain, size: [u32; 2]) -> View {
+    let z = ground(terrain);
+    let eye = [ARCH[0] + 60.0, ARCH[1] - 130.0, z + 60.0];
+    View::looking_at(eye, [ARCH[0], ARCH[1], z + 10.0], 0.8, size)
 }
 
 #[test]
@@ -102,9 +105,7 @@ fn there_is_daylight_under_the_arch_and_stone_above_it() {
         return;
     };
     let mut terrain = terrain(&gpu);
-    let z = ground(&terrain);
-    let eye = [ARCH[0] + 60.0, ARCH[1] - 130.0, z + 60.0];
-    let view = View::looking_at(eye, [ARCH[0], ARCH[1], z + 10.0], 0.8, SIZE);
+    let view = below_the_arch(&terrain, SIZE);
     let (features, distances) = draw(&gpu, &mut terrain, "arch.png", &view);
     assert_eq!(features, 1);
     let is_there =
@@ -137,14 +138,13 @@ fn engine_colours_show_the_arch_too_and_far_away_its_ground_is_drawn() {
     };
     let mut terrain = terrain(&gpu);
     let z = ground(&terrain);
-    let near = [ARCH[0] + 60.0, ARCH[1] - 130.0, z + 60.0];
     let target = [ARCH[0], ARCH[1], z + 10.0];
     terrain.set_look(Look {
         depth_colors: true,
         wireframe: true,
         ..terrain.look()
     });
-    let view = View::looking_at(near, target, 0.8, SIZE);
+    let view = below_the_arch(&terrain, SIZE);
     let (features, _) = draw(&gpu, &mut terrain, "arch_depths.png", &view);
     assert_eq!(features, 1);
     let view = View::looking_at([9000.0, -9000.0, 3000.0], target, 0.8, SIZE);

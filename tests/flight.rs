@@ -5,7 +5,9 @@ use std::{fs, path::Path};
 use drumlin_core::{dem, geo::Grid};
 use serde_json::{Value, json};
 
-use crate::support::{drumlin_ok, folder, has_gpu, rainier, rainier_pyramid};
+use crate::support::{
+    copy_tree, drumlin_fails, drumlin_ok, files, folder, has_gpu, rainier, rainier_pyramid,
+};
 
 const WIDTH: usize = 480;
 const HEIGHT: usize = 270;
@@ -246,4 +248,38 @@ fn below_the_horizon_every_pixel_is_ground_while_tiles_arrive_late() {
             }
         }
     }
+}
+
+#[test]
+fn a_flight_that_waits_for_a_broken_tile_ends_and_names_it() {
+    if !has_gpu() {
+        return;
+    }
+    let out = folder("broken");
+    let pyramid = out.join("rainier.zarr");
+    copy_tree(rainier_pyramid(), &pyramid);
+    let mut finest = Vec::new();
+    files(&pyramid.join("tile/4"), &mut finest);
+    // The second half of a shard holds tiles, and some of those are always seen along the path.
+    for file in finest {
+        let mut bytes = fs::read(&file).expect("a file can be read");
+        let half = bytes.len() / 2;
+        bytes[half..].iter_mut().for_each(|byte| *byte ^= 0x10);
+        fs::write(&file, bytes).expect("a file can be written");
+    }
+    let path = path_file(&out);
+    let fly = |wait: &[&str]| {
+        let [pyramid, path] = [&pyramid, &path].map(|path| path.to_str().expect("a plain path"));
+        [
+            "fly", pyramid, "--path", path, "--size", "160x90", "--fps", "1",
+        ]
+        .into_iter()
+        .chain(wait.iter().copied())
+        .map(str::to_owned)
+        .collect::<Vec<_>>()
+    };
+    let line = drumlin_fails(1, fly(&["--wait-for-tiles"]));
+    assert!(line.contains("tile 4/"), "{line}");
+    // Who does not wait sees the parents instead, and the flight goes on.
+    drumlin_ok(fly(&[]));
 }

@@ -7,10 +7,13 @@ use std::{
     sync::OnceLock,
 };
 
-use drumlin::{Headless, Look, Offscreen, Pace, Terrain, TerrainDescriptor, View};
-use image::{ExtendedColorType, ImageBuffer, Luma, Rgb, RgbImage};
+use drumlin::{Headless, Look, Pace, Terrain, TerrainDescriptor, View};
+use image::{ImageBuffer, Luma, Rgb, RgbImage};
 
-use crate::support::{drumlin_ok, folder};
+use crate::{
+    picture,
+    support::{drumlin_ok, folder},
+};
 
 const SIZE: [u32; 2] = [320, 180];
 /// Samples of the flat ground, ten metres apart: six by four finest tiles.
@@ -36,7 +39,7 @@ fn gradient(at: [f64; 2]) -> [f64; 3] {
 
 /// A gradient of many colours, and fields of twenty metres in black and white.
 #[derive(Clone, Copy)]
-enum Motif {
+pub(crate) enum Motif {
     Gradient,
     Fields,
 }
@@ -92,7 +95,7 @@ fn ground(folder: &Path) -> PathBuf {
 }
 
 /// A pyramid of the flat ground, with or without a picture.
-fn pyramid(name: &str, motif: Option<Motif>) -> PathBuf {
+pub(crate) fn pyramid(name: &str, motif: Option<Motif>) -> PathBuf {
     let folder = folder(&format!("imagery_{name}"));
     let out = folder.join("ground.zarr");
     let mut arguments: Vec<OsString> = vec!["build".into(), ground(&folder).into()];
@@ -130,21 +133,8 @@ fn draw(gpu: &Headless, pyramid: &Path, view: &View, name: &str) -> Vec<[u8; 3]>
         ..TerrainDescriptor::at(pyramid)
     };
     let mut terrain = Terrain::new(&gpu.device, &gpu.queue, descriptor).expect("a terrain");
-    let target = Offscreen::new(&gpu.device, SIZE);
-    let report = terrain.update(view);
-    assert!(report.errors.is_empty(), "{:?}", report.errors);
+    let (report, color) = picture::draw(gpu, &mut terrain, view, [1.0, 0.0, 1.0, 1.0], name);
     assert_eq!(report.stats.colors_missing, 0);
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    terrain.prepare(&gpu.device, &gpu.queue, &mut encoder);
-    terrain.draw(&mut target.color_pass(&mut encoder, [1.0, 0.0, 1.0, 1.0], None));
-    gpu.queue.submit([encoder.finish()]);
-    let color = target.read_color(&gpu.device, &gpu.queue).expect("colours");
-    gpu.finish().expect("no complaint");
-    if let Some(folder) = std::env::var_os("DRUMLIN_PICTURES") {
-        let path = Path::new(&folder).join(name);
-        let [width, height] = SIZE;
-        image::save_buffer(path, &color, width, height, ExtendedColorType::Rgba8).expect("a PNG");
-    }
     let (pixels, _) = color.as_chunks::<4>();
     pixels.iter().map(|&[r, g, b, _]| [r, g, b]).collect()
 }

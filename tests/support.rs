@@ -142,6 +142,34 @@ pub(crate) fn rainier_pyramid() -> &'static Path {
     })
 }
 
+/// Copies a folder and all in it.
+pub(crate) fn copy_tree(from: &Path, to: &Path) {
+    fs::create_dir_all(to).expect("a folder can be made");
+    for entry in fs::read_dir(from).expect("the folder can be read") {
+        let path = entry.expect("the entry can be read").path();
+        let target = to.join(path.file_name().expect("an entry has a name"));
+        if path.is_dir() {
+            copy_tree(&path, &target);
+        } else {
+            fs::copy(&path, &target)
+                .map(|_| ())
+                .expect("a file can be copied");
+        }
+    }
+}
+
+/// Adds the paths of all files in a folder and below it.
+pub(crate) fn files(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).expect("the folder can be read") {
+        let path = entry.expect("the entry can be read").path();
+        if path.is_dir() {
+            files(&path, found);
+        } else {
+            found.push(path);
+        }
+    }
+}
+
 /// True when pictures can be drawn; says so when they cannot.
 ///
 /// # Panics

@@ -12,7 +12,7 @@ use std::{path::PathBuf, sync::Arc};
 use drumlin_core::{
     geo::TileId,
     pyramid::Metadata,
-    stream::{TileSource, View},
+    stream::{Retry, TileSource, View},
     terrain::{
         Collider, FramePlan, FrameStats, Hit, Planner, PlannerDescriptor, PyramidSource, Surface,
         Updater,
@@ -41,7 +41,8 @@ pub enum Pace {
     Paced,
     /// Every frame makes its own plan, on the caller's thread; tiles still arrive when they arrive.
     Stepped,
-    /// As stepped, and every frame waits until nothing is missing: for pictures and tests.
+    /// As stepped, and every frame waits until nothing is missing: for pictures and tests. What cannot be read eight times
+    /// in three seconds is gone without; [`FrameStats::given_up`] counts it.
     Complete,
 }
 
@@ -311,10 +312,20 @@ impl Terrain {
     }
 }
 
+/// A frame that waits for its tiles gives one up after its eight tries: three to four seconds.
+const WAITING_RETRY: Retry = Retry {
+    first_millis: 25,
+    longest_millis: 2000,
+};
+
 fn planner_descriptor(
     descriptor: &TerrainDescriptor,
     metadata: &Metadata,
 ) -> Result<PlannerDescriptor, RenderError> {
+    let (usual, wait_for_tiles) = (
+        PlannerDescriptor::default(),
+        descriptor.pace == Pace::Complete,
+    );
     Ok(PlannerDescriptor {
         ram_budget_bytes: descriptor.ram_budget_bytes,
         vram_budget_bytes: vram::planner_budget(
@@ -323,9 +334,14 @@ fn planner_descriptor(
         )?,
         loader_threads: descriptor.loader_threads.max(1),
         error_px: descriptor.error_px,
-        wait_for_tiles: descriptor.pace == Pace::Complete,
+        wait_for_tiles,
         uniform_depth: descriptor.uniform_depth,
-        ..PlannerDescriptor::default()
+        retry: if wait_for_tiles {
+            WAITING_RETRY
+        } else {
+            usual.retry
+        },
+        ..usual
     })
 }
 

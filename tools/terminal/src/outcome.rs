@@ -118,6 +118,10 @@ mod tests {
             code(PyramidError::Refused("no".into()).into()),
             Outcome::Usage
         );
+        assert_eq!(
+            code(PyramidError::Unfit("all void".into()).into()),
+            Outcome::InvalidData
+        );
         assert_eq!(code(PyramidError::Interrupted.into()), Outcome::Interrupted);
         assert_eq!(
             code(

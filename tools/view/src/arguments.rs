@@ -74,7 +74,7 @@ pub(crate) struct FlyArguments {
     /// How time passes
     #[arg(long, value_enum, default_value_t = Mode::Stepped)]
     pub(crate) mode: Mode,
-    /// Draws each frame only when no tile is missing
+    /// Draws each frame only when no tile is missing; ends with code 1 where one cannot be read
     #[arg(long)]
     pub(crate) wait_for_tiles: bool,
     /// Folder for one PNG a frame

@@ -169,7 +169,8 @@ impl<'a> Flight<'a> {
         let view = self.scene.view(camera, size, seconds);
         self.last_view = Some(view);
         let mut watch = Stopwatch::start();
-        self.scene.update(&view, Debug::of(&self.arguments.terrain));
+        self.scene
+            .update(&view, Debug::of(&self.arguments.terrain))?;
         let update = watch.lap();
         self.collect();
         let commands = self.encode();
@@ -272,7 +273,7 @@ impl<'a> Flight<'a> {
         if let Some(view) = self.last_view {
             for _ in 0..LATE_FRAMES {
                 self.headless.finish()?;
-                self.scene.update(&view, Debug::default());
+                self.scene.update(&view, Debug::default())?;
                 self.collect();
                 let commands = self.encode();
                 self.headless.queue.submit([commands]);

@@ -1,9 +1,12 @@
 //! A terrain on a device, with the looks this program gives it: sky, haze, and what the debug keys show.
 
+use std::path::PathBuf;
+
 use anyhow::Result;
 use drumlin::{
     FrameReport, Look, Pace, TargetFormats, Terrain, TerrainDescriptor, TerrainSource, View, wgpu,
 };
+use drumlin_core::pyramid::PyramidError;
 
 use crate::{arguments::TerrainArguments, camera::Camera, data_set::DataSet, sky::Sky};
 
@@ -37,6 +40,8 @@ pub(crate) struct Scene {
     view: Option<View>,
     size: f64,
     frames: u64,
+    pyramid: PathBuf,
+    is_complete: bool,
 }
 
 impl Scene {
@@ -70,6 +75,8 @@ impl Scene {
             view: None,
             size: data.size_metres(),
             frames: 0,
+            pyramid: arguments.pyramid.clone(),
+            is_complete: pace == Pace::Complete,
         })
     }
 
@@ -89,7 +96,11 @@ impl Scene {
     }
 
     /// Chooses what is drawn for a view, and tells what went wrong.
-    pub(crate) fn update(&mut self, view: &View, debug: Debug) {
+    ///
+    /// # Errors
+    /// Where every frame shall be complete and this one cannot be: a tile or its picture could not be read, time and
+    /// again.
+    pub(crate) fn update(&mut self, view: &View, debug: Debug) -> Result<(), PyramidError> {
         let Debug {
             wireframe,
             depth_colors,
@@ -103,9 +114,17 @@ impl Scene {
         });
         self.view = Some(*view);
         self.report = self.terrain.update(view);
-        for error in &self.report.errors {
+        let FrameReport { stats, errors, .. } = &self.report;
+        if self.is_complete && stats.given_up > 0 {
+            return Err(PyramidError::Invalid {
+                path: self.pyramid.clone(),
+                what: format!("a frame must go without: {}", errors.join("; ")),
+            });
+        }
+        for error in errors {
             eprintln!("drumlin-view: {error}");
         }
+        Ok(())
     }
 
     /// Encodes the update's uploads and stages.

@@ -160,7 +160,7 @@ impl Viewer {
             self.screen.size(),
             self.clock.start.elapsed().as_secs_f64(),
         );
-        self.scene.update(&view, self.debug);
+        self.scene.update(&view, self.debug)?;
         let last = self
             .arguments
             .exit_after

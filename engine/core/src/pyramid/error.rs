@@ -37,6 +37,9 @@ pub enum PyramidError {
     /// An input cannot be read.
     #[error(transparent)]
     Dem(#[from] DemError),
+    /// What was given cannot become a pyramid: no height at all, heights over a limit, features that do not fit.
+    #[error("{0}")]
+    Unfit(String),
     /// What was asked for cannot be done.
     #[error("{0}")]
     Refused(String),

@@ -63,7 +63,9 @@ pub struct Scheduler {
     behind: bool,
 }
 
-/// Tries after which a plan that waits for its tiles goes on without one.
+/// Tries after which a plan that waits for its tiles goes on without one; [`FrameStats::given_up`] counts those.
+///
+/// [`FrameStats::given_up`]: crate::terrain::FrameStats::given_up
 pub(crate) const PATIENCE: u32 = 8;
 
 impl Scheduler {

@@ -417,6 +417,7 @@ impl Planner {
             slots_used,
             color_layers_used: self.colors.used(),
             failures: self.scheduler.failures(),
+            given_up: self.given_up(),
             features_drawn: plan.features.len(),
             feature_bytes: self
                 .features
@@ -424,6 +425,14 @@ impl Planner {
                 .map_or([0; 2], FeaturePool::byte_counts),
             ..FrameStats::default()
         }
+    }
+
+    /// Wanted tiles and pictures that are waited for no longer.
+    fn given_up(&self) -> usize {
+        let tile = |&&place: &&u32| matches!(self.tree.node(place).life, Life::Failed { attempts, .. } if attempts >= PATIENCE);
+        let color = |&&place: &&u32| matches!(self.tree.node(place).color, ColorLife::Failed { attempts, .. } if attempts >= PATIENCE);
+        self.wanted.nodes.iter().filter(tile).count()
+            + self.colors.wanted.iter().filter(color).count()
     }
 
     /// Of the screen that drawn tiles cover, the share of those that should be finer.

@@ -263,9 +263,10 @@ fn a_plan_that_waits_lacks_nothing_and_is_the_same_every_time() {
                 (
                     stats.tiles_missing,
                     stats.colors_missing,
+                    stats.given_up,
                     stats.missing_share
                 ),
-                (0, 0, 0.0)
+                (0, 0, 0, 0.0)
             );
             plan
         };

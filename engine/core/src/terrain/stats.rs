@@ -35,6 +35,9 @@ pub struct FrameStats {
     pub in_flight: usize,
     /// Reads that failed so far.
     pub failures: u64,
+    /// Wanted tiles and pictures that failed eight times: plans that wait go on without them. They are tried again, ever
+    /// more rarely.
+    pub given_up: usize,
     /// Features drawn in place of the ground they were laid into.
     pub features_drawn: usize,
     /// Bytes of features' meshes in GPU memory, and of them and what they are made from in RAM.

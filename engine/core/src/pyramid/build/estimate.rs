@@ -161,7 +161,7 @@ fn estimate(raster: &dyn Raster, options: &BuildOptions) -> Result<Option<[f64; 
         let report = match build(&part, None, &options, &|_| (), &AtomicBool::new(false)) {
             Ok(report) => report,
             // A window without any height tells nothing.
-            Err(PyramidError::Refused(_)) if part.is_void()? => continue,
+            Err(PyramidError::Unfit(_)) if part.is_void()? => continue,
             Err(error) => return Err(error),
         };
         fs::remove_dir_all(&output).map_err(PyramidError::io("removing", &output))?;

@@ -164,7 +164,7 @@ fn records(groups: &[FeatureGroup]) -> Result<BTreeMap<TileId, Vec<u8>>, Pyramid
         .collect();
     let longest = records.values().map(Vec::len).max().unwrap_or(0);
     if longest > FEATURE_BYTES_LIMIT as usize {
-        return Err(PyramidError::Refused(format!(
+        return Err(PyramidError::Unfit(format!(
             "the features of one tile take {longest} bytes; the limit is {FEATURE_BYTES_LIMIT}"
         )));
     }

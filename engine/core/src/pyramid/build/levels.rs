@@ -140,10 +140,15 @@ impl Rise<'_> {
         let [rows, columns] = [grid.rows, grid.columns];
         let total = u64::from(rows) * u64::from(columns);
         let advance = watch.stage(Stage::Read, total);
-        *void_count = read_finest(raster, scale.unit(), &plane, shape.window_samples, &advance)?;
+        let name = &raster.header().source.name;
+        *void_count = read_finest(raster, scale.unit(), &plane, shape.window_samples, &advance)
+            .map_err(|error| match error {
+                PyramidError::Unfit(what) => PyramidError::Unfit(format!("{name}: {what}")),
+                other => other,
+            })?;
         if *void_count == total {
-            return Err(PyramidError::Refused(format!(
-                "all {rows} x {columns} samples are void: there is no terrain"
+            return Err(PyramidError::Unfit(format!(
+                "{name}: all {rows} x {columns} samples are void: there is no terrain"
             )));
         }
         let data = [rows, columns].map(|count| count as usize);

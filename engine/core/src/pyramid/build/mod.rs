@@ -59,9 +59,10 @@ use crate::geo::Grid;
 /// or level; what it has written is gone on with by the next run with the same options, where sources are named.
 ///
 /// # Errors
-/// [`PyramidError::Refused`] for options that cannot be met, heights out of range, a raster that is all void, an output
-/// that is something else; [`PyramidError::Dem`] where an input fails; [`PyramidError::Io`] where writing does;
-/// [`PyramidError::Interrupted`]. Nothing is called by the output's name unless it is whole.
+/// [`PyramidError::Refused`] for options that cannot be met or an output that is something else;
+/// [`PyramidError::Unfit`] for heights out of range, a raster that is all void, or features that cannot be laid;
+/// [`PyramidError::Dem`] where an input fails; [`PyramidError::Io`] where writing does; [`PyramidError::Interrupted`].
+/// Nothing is called by the output's name unless it is whole.
 pub fn build(
     raster: &dyn Raster,
     imagery: Option<&Imagery<'_>>,

@@ -106,7 +106,7 @@ pub(super) fn quantise(
         }
     }
     if greatest >= CONTROL_LIMIT.unsigned_abs() {
-        return Err(PyramidError::Refused(format!(
+        return Err(PyramidError::Unfit(format!(
             "a cage's control of {greatest} units is over the limit of 2^25; a greater error bound or unit allows it"
         )));
     }

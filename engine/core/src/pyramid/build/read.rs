@@ -132,7 +132,7 @@ fn to_units(height: f64, unit: f64) -> Option<i32> {
 }
 
 fn out_of_range(row: usize, column: usize, height: f64, unit: f64) -> PyramidError {
-    PyramidError::Refused(format!(
+    PyramidError::Unfit(format!(
         "the height {height} m at row {row}, column {column} is over the limit of 2^25 units of {unit} m; a greater \
          error bound or unit allows it, and a value that means void must be declared"
     ))

@@ -23,10 +23,10 @@ const MARGIN: i64 = 3;
 /// Lays a cage into the ground.
 ///
 /// # Errors
-/// [`PyramidError::Refused`], with the feature's name, where the cage has no rim or several, its rim crosses itself or
+/// [`PyramidError::Unfit`], with the feature's name, where the cage has no rim or several, its rim crosses itself or
 /// faces down, it reaches past the data, its rim is over void samples, or it is too large or too high.
 pub fn lay(input: &FeatureInput, site: &Site<'_>) -> Result<LaidFeature, PyramidError> {
-    let refuse = |what: String| PyramidError::Refused(format!("feature {}: {what}", input.name));
+    let refuse = |what: String| PyramidError::Unfit(format!("feature {}: {what}", input.name));
     let rim = rim(&input.cage).map_err(refuse)?;
     let placed = place(input, site).map_err(refuse)?;
     let cut = cut(&placed, site).map_err(refuse)?;

@@ -160,7 +160,7 @@ fn cell(at: f64, count: u32) -> ([u32; 2], f64) {
 /// Lays all features, and refuses cuts that meet.
 ///
 /// # Errors
-/// As [`lay`]; [`PyramidError::Refused`] where two cuts have a patch or a border in common.
+/// As [`lay`]; [`PyramidError::Unfit`] where two cuts have a patch or a border in common.
 pub(in crate::pyramid) fn lay_all(
     inputs: &[FeatureInput],
     site: &Site<'_>,
@@ -169,7 +169,7 @@ pub(in crate::pyramid) fn lay_all(
     for input in inputs {
         let feature = lay(input, site)?;
         if let Some(other) = laid.iter().position(|other| meet(other.cut, feature.cut)) {
-            return Err(PyramidError::Refused(format!(
+            return Err(PyramidError::Unfit(format!(
                 "features {} and {} are laid on one spot: with the ground around them they take patches {} and {}, \
                  which overlap or touch",
                 inputs[other].name,
