@@ -23,7 +23,7 @@ pub struct PeerOrder {
     /// Places along each side of a face, in the middles of its squares.
     pub places: u8,
     /// Runs of every step.
-    pub runs: usize,
+    pub runs: u8,
 }
 
 /// The harness's figures: seconds of every run, bytes and counts.
