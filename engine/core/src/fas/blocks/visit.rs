@@ -207,7 +207,7 @@ impl Blocks {
             visit(&Entry::Cap(CapEntry {
                 place: cap.place,
                 finer: cap.finer,
-                cap: cap,
+                cap,
                 turn: Turn(0),
                 points: Numbers::From(0),
             }));
