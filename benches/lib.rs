@@ -1,1 +1,15 @@
-//! The experiments behind every published figure.
+//! The experiments behind every published figure, and what they share.
+//!
+//! One binary an experiment; each prints a table and, with `--json FILE`, writes the same numbers. Above everything
+//! else: nothing imports this crate.
+
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "cages of experiments are numbered in 32 bits by the core"
+)]
+
+pub mod heights;
+pub mod measure;
+pub mod peer;
+pub mod quadtree;
+pub mod terrain_cage;

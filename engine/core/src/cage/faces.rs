@@ -64,6 +64,12 @@ impl Faces {
         &self.vertices
     }
 
+    /// Bytes of both lists.
+    #[must_use]
+    pub fn byte_count(&self) -> usize {
+        4 * (self.offsets.len() + self.vertices.len())
+    }
+
     /// All faces in order.
     pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
         self.offsets

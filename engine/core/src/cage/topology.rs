@@ -302,6 +302,22 @@ impl Topology {
         self.holes.get(face as usize).copied().unwrap_or(false)
     }
 
+    /// Bytes of all lists.
+    #[must_use]
+    pub fn byte_count(&self) -> usize {
+        let words = self.corner_faces.len()
+            + self.corner_edges.len()
+            + self.ring_edge_offsets.len()
+            + self.ring_corner_offsets.len()
+            + self.ring_edges.len()
+            + self.ring_corners.len();
+        self.faces.byte_count()
+            + 4 * words
+            + 8 * (self.edge_vertices.len() + self.edge_faces.len())
+            + 8 * (self.edge_sharpness.len() + self.vertex_sharpness.len())
+            + self.holes.len()
+    }
+
     /// The edge between two vertices.
     #[must_use]
     pub fn edge_between(&self, a: u32, b: u32) -> Option<u32> {

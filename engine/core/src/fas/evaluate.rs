@@ -8,9 +8,9 @@
 
 use super::{
     Cap, CapRing, Patch, Place,
-    execute::{Real, add, scale},
+    execute::{add, scale},
 };
-use crate::subdiv::{basis, basis_derivative};
+use crate::subdiv::{Real, basis, basis_derivative};
 
 /// A point of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

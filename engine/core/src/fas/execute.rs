@@ -3,35 +3,12 @@
 //! Gathers only, level by level and kind by kind, so that rows of one kind may run in any order; the twin of the GPU's
 //! points stage.
 
-use std::ops::{Add, Mul, Range, Sub};
+use std::ops::Range;
 
 use rayon::prelude::*;
 
 use super::{LevelRows, Tables};
-
-/// Number type of positions: f32 or f64.
-pub trait Real:
-    Copy + Send + Sync + Default + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
-{
-    /// The nearest value of this type.
-    fn of(value: f64) -> Self;
-}
-
-impl Real for f64 {
-    fn of(value: f64) -> Self {
-        value
-    }
-}
-
-impl Real for f32 {
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "rounding to f32 is what is asked for"
-    )]
-    fn of(value: f64) -> Self {
-        value as Self
-    }
-}
+pub(super) use crate::subdiv::Real;
 
 /// Rows a task: large enough to be worth one, small enough to share.
 const ROWS_A_TASK: usize = 4096;

@@ -26,18 +26,20 @@ mod execute;
 mod feature;
 mod mesh;
 mod patch;
+mod pattern;
 mod refine;
 mod rows;
 mod tables;
 #[cfg(test)]
 mod testing;
 
+pub use crate::subdiv::Real;
 pub use blocks::{Blocks, CapEntry, Changes, Entry, Piece, Positions};
 pub use cap::{Cap, CapRing};
 pub use depth::{DepthRule, Feature, Features, MAX_RULE_DEPTH};
 pub use evaluate::Sample;
-pub use execute::Real;
 pub use feature::{FeatureKind, features};
 pub use patch::{Patch, Place, RenderTable};
+pub use pattern::PatchPattern;
 pub use rows::{BlendRow, LevelRows, PointCounts};
 pub use tables::{MAX_DEPTH, Tables};

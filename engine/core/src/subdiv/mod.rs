@@ -7,16 +7,20 @@
 //! T. DeRose, M. Kass, T. Truong, *Subdivision surfaces in character animation* (1998).
 
 mod bspline;
+mod lanes;
 mod lattice;
 mod limit;
+mod real;
 mod rules;
 
 pub use bspline::{basis, basis_derivative};
+pub use lanes::LaneWeights;
 pub use lattice::{subdivide_lattice, subdivide_line};
 pub use limit::{
     CREASE_LIMIT, CreaseTangent, SmoothLimit, crease_tangent, smooth_limit, smooth_tangent,
     subdominant_eigenvalue,
 };
+pub use real::Real;
 pub use rules::{
     EdgeMask, INFINITE_SHARPNESS, VertexMask, VertexRule, child_sharpness, edge_mask,
     stored_sharpness, vertex_mask, vertex_rule,

@@ -1,8 +1,9 @@
 //! The same places on every face: limit stencils, shared by all faces of one shape.
 //!
 //! A stencil is the weights of a face's controls in the position at one place, and in the two derivatives. It is exact
-//! however deep the place lies, and costs one multiply-add a control, whatever the depth. Positions may change from
-//! call to call; only a change of topology or sharpness needs a new pattern.
+//! however deep the place lies, and costs one multiply-add a control, whatever the depth; places of a face lie side by
+//! side ([`LaneWeights`]). Positions may change from call to call; only a change of topology or sharpness needs a new
+//! pattern.
 
 #![expect(
     clippy::cast_possible_truncation,
@@ -18,18 +19,12 @@ use super::super::topology::Topology;
 use super::shape::{Shape, controls, key};
 use super::split::{Scratch, sample};
 use super::{LimitSample, patch::Jet};
+use crate::subdiv::{LaneWeights, Real};
 
-/// Weights of one control in position, `du` and `dv` at one place.
-type Weights = [f64; 3];
-
-/// Stencils of one shape of face.
+/// Stencils of one shape of face: weights of all controls at all places in position, `du` and `dv`.
 #[derive(Debug)]
-struct Stencils {
-    control_count: usize,
-    /// For every place the weights of all controls in its position.
-    position: Vec<f64>,
-    /// The same with derivatives; not kept for patterns of positions only.
-    jet: Vec<Weights>,
+struct Stencils<T> {
+    jet: [LaneWeights<T>; 3],
 }
 
 /// Controls a pattern may have: so many a face on average, and some for a few poles of high valence, each of whose faces
@@ -37,18 +32,18 @@ struct Stencils {
 const CONTROLS_A_FACE: u64 = 64;
 const CONTROLS_OF_POLES: u64 = 1 << 22;
 
-/// Places that are evaluated on every face of an all-quad cage.
+/// Places that are evaluated on every face of an all-quad cage, in f64 or f32.
 #[derive(Debug)]
-pub struct LimitPattern {
+pub struct LimitPattern<T = f64> {
     place_count: usize,
-    stencils: Vec<Stencils>,
+    stencils: Vec<Stencils<T>>,
     /// For each face its shape's stencils, and the end of its controls in the list.
     faces: Vec<[u32; 2]>,
     controls: Vec<u32>,
     vertex_count: u32,
 }
 
-impl LimitPattern {
+impl<T: Real> LimitPattern<T> {
     /// Prepares places, as (u, v) in the unit square, on all faces of a topology; holes are faces like any other here.
     ///
     /// # Errors
@@ -126,18 +121,58 @@ impl LimitPattern {
     /// # Panics
     /// When there are fewer positions than the topology has vertices.
     #[must_use]
-    pub fn positions(&self, positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        let mut out = Vec::with_capacity(self.faces.len() * self.place_count);
-        self.for_each_face(positions, |stencils, controls| {
-            let weights = stencils.position.chunks_exact(stencils.control_count);
-            out.extend(weights.map(|weights| {
-                let [x, y, z, _] = sum(weights, controls);
-                [x, y, z]
-            }));
-        });
+    pub fn positions(&self, positions: &[[T; 3]]) -> Vec<[T; 3]> {
+        let mut out = vec![[T::default(); 3]; self.faces.len() * self.place_count];
+        self.positions_into(positions, &mut out);
         out
     }
 
+    /// [`LimitPattern::positions`] into memory that is there.
+    ///
+    /// # Panics
+    /// When there are fewer positions than the topology has vertices, or `out` is not one a place of every face.
+    pub fn positions_into(&self, positions: &[[T; 3]], out: &mut [[T; 3]]) {
+        self.evaluate_into(positions, [out]);
+    }
+
+    /// Limit positions and derivatives by u and by v, each like [`LimitPattern::positions_into`]. At extraordinary
+    /// vertices derivatives are the limit tangents, as of [`LimitSurface`](super::LimitSurface).
+    ///
+    /// # Panics
+    /// When there are fewer positions than the topology has vertices, or a list is not one a place of every face.
+    pub fn jets_into(&self, positions: &[[T; 3]], out: [&mut [[T; 3]]; 3]) {
+        self.evaluate_into(positions, out);
+    }
+
+    /// The first `N` of position, `du` and `dv`.
+    fn evaluate_into<const N: usize>(&self, positions: &[[T; 3]], mut out: [&mut [[T; 3]]; N]) {
+        assert!(
+            positions.len() >= self.vertex_count as usize,
+            "one position for every vertex"
+        );
+        let wanted = self.faces.len() * self.place_count;
+        assert!(
+            out.iter().all(|out| out.len() == wanted),
+            "one sample a place of every face"
+        );
+        if self.place_count == 0 {
+            return;
+        }
+        let (mut gathered, mut start) = (Vec::new(), 0);
+        for (face, &[class, end]) in self.faces.iter().enumerate() {
+            let controls = &self.controls[start..end as usize];
+            gathered.clear();
+            gathered.extend(controls.iter().map(|&vertex| positions[vertex as usize]));
+            let places = face * self.place_count..(face + 1) * self.place_count;
+            for (weights, out) in self.stencils[class as usize].jet.iter().zip(&mut out) {
+                weights.sum_into(&gathered, &mut out[places.clone()]);
+            }
+            start = end as usize;
+        }
+    }
+}
+
+impl LimitPattern {
     /// Limit samples, face by face and place by place. At extraordinary vertices derivatives are the limit tangents, as
     /// of [`LimitSurface`](super::LimitSurface). The normal is their product always: zero at a crease's vertex with one
     /// face on that side, where both tangents are one line.
@@ -146,65 +181,19 @@ impl LimitPattern {
     /// When there are fewer positions than the topology has vertices.
     #[must_use]
     pub fn samples(&self, positions: &[[f64; 3]]) -> Vec<LimitSample> {
-        let mut out = Vec::with_capacity(self.faces.len() * self.place_count);
-        self.for_each_face(positions, |stencils, controls| {
-            let weights = stencils.jet.chunks_exact(stencils.control_count);
-            out.extend(weights.map(|weights| sample(jet(weights, controls), DVec3::ZERO, 1.0)));
+        let mut parts = [0, 1, 2].map(|_| vec![[0.0; 3]; self.faces.len() * self.place_count]);
+        let [at, du, dv] = &mut parts;
+        self.jets_into(positions, [at, du, dv]);
+        let jets = at.iter().zip(du).zip(dv).map(|((at, du), dv)| Jet {
+            position: DVec3::from_array(*at),
+            du: DVec3::from_array(*du),
+            dv: DVec3::from_array(*dv),
         });
-        out
-    }
-
-    fn for_each_face(
-        &self,
-        positions: &[[f64; 3]],
-        mut evaluate: impl FnMut(&Stencils, &[[f64; 4]]),
-    ) {
-        assert!(
-            positions.len() >= self.vertex_count as usize,
-            "one position for every vertex"
-        );
-        let (mut gathered, mut start) = (Vec::new(), 0);
-        for &[class, end] in &self.faces {
-            gathered.clear();
-            gathered.extend(self.controls[start..end as usize].iter().map(|&vertex| {
-                let [x, y, z] = positions[vertex as usize];
-                [x, y, z, 0.0]
-            }));
-            evaluate(&self.stencils[class as usize], &gathered);
-            start = end as usize;
-        }
+        jets.map(|jet| sample(jet, DVec3::ZERO, 1.0)).collect()
     }
 }
 
-#[inline]
-fn sum(weights: &[f64], controls: &[[f64; 4]]) -> [f64; 4] {
-    let mut sums = [0.0; 4];
-    for (weight, control) in weights.iter().zip(controls) {
-        add(&mut sums, *weight, control);
-    }
-    sums
-}
-
-#[inline]
-fn jet(weights: &[Weights], controls: &[[f64; 4]]) -> Jet {
-    let mut sums = [[0.0; 4]; 3];
-    for (weights, control) in weights.iter().zip(controls) {
-        add(&mut sums[0], weights[0], control);
-        add(&mut sums[1], weights[1], control);
-        add(&mut sums[2], weights[2], control);
-    }
-    let [position, du, dv] = sums.map(|[x, y, z, _]| DVec3::new(x, y, z));
-    Jet { position, du, dv }
-}
-
-#[inline(always)]
-fn add(sum: &mut [f64; 4], weight: f64, control: &[f64; 4]) {
-    for (sum, x) in sum.iter_mut().zip(control) {
-        *sum += weight * x;
-    }
-}
-
-impl Stencils {
+impl<T: Real> Stencils<T> {
     /// Evaluates the surface of unit controls, three at a time, one in each coordinate.
     fn new(shape: &Shape, places: &[[f64; 2]]) -> Self {
         let control_count = shape.control_count;
@@ -225,10 +214,13 @@ impl Stencils {
                 }
             }
         }
+        let of = |part: usize| {
+            LaneWeights::new(places.len(), control_count, |place, control| {
+                jet[place * control_count + control][part]
+            })
+        };
         Self {
-            control_count,
-            position: jet.iter().map(|weights| weights[0]).collect(),
-            jet,
+            jet: [0, 1, 2].map(of),
         }
     }
 }
