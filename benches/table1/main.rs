@@ -1,0 +1,134 @@
+//! Classic against adaptive refinement at the same worst error, on four cages with the counts of the paper's Table 1.
+//!
+//! ```text
+//! cargo run --release -p drumlin-benches --bin table1 -- [--cages FOLDER] [--json FILE]
+//! ```
+//!
+//! Based on: Lin, Wang, Sun, *Improved feature-adaptive subdivision for Catmull-Clark surface model* (2018), Table 1.
+
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "positions of experiments are rounded to f32 on purpose"
+)]
+
+mod errors;
+mod rows;
+mod scheme;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result};
+use clap::Parser;
+use drumlin_benches::{
+    measure::{self, Machine, geometric_mean},
+    terrain_cage::{CageCounts, cage_counts},
+};
+use drumlin_core::{
+    cage::{Cage, CageBudget, read_obj},
+    fas::Features,
+};
+use serde::Serialize;
+
+use self::{
+    errors::{Errors, mean_edge_length},
+    scheme::Scheme,
+};
+
+/// The paper's models; the cages have their counts, not their shape.
+const NAMES: [&str; 4] = ["hippo", "crocodile", "gorilla", "koala"];
+
+/// Classic against adaptive refinement at the same worst error.
+#[derive(Parser)]
+struct Arguments {
+    /// Folder with table1_hippo.obj, table1_crocodile.obj, table1_gorilla.obj and table1_koala.obj.
+    #[arg(long, default_value = "../shared/reference/catmull-clark/table1")]
+    cages: PathBuf,
+    /// Worst error allowed, in mean edge lengths of the cage.
+    #[arg(long, default_value_t = 1e-3)]
+    bound: f64,
+    /// Runs of every step; the median is printed.
+    #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u8).range(1..))]
+    runs: u8,
+    /// Writes all figures.
+    #[arg(long)]
+    json: Option<PathBuf>,
+}
+
+/// Everything, as JSON.
+#[derive(Serialize)]
+struct Report {
+    machine: Machine,
+    /// In mean edge lengths.
+    bound: f64,
+    cages: Vec<Case>,
+    /// Geometric mean of classic's total over adaptive's, one thread.
+    total_ratio: f64,
+}
+
+/// One cage's figures; lengths are the cage's own.
+#[derive(Serialize)]
+struct Case {
+    name: &'static str,
+    cage: CageCounts,
+    mean_edge_length: f64,
+    bound: f64,
+    /// What the depth rule was tuned to.
+    tolerance: f64,
+    classic: Scheme,
+    adaptive: Scheme,
+}
+
+impl Case {
+    /// Classic's total over adaptive's, one thread.
+    fn total_ratio(&self) -> f64 {
+        self.classic.one_thread.total() / self.adaptive.one_thread.total()
+    }
+}
+
+fn main() -> Result<()> {
+    let arguments = Arguments::parse();
+    let cases = NAMES.map(|name| case(name, &arguments).with_context(|| name.to_owned()));
+    let cages = cases.into_iter().collect::<Result<Vec<_>>>()?;
+    let ratios: Vec<_> = cages.iter().map(Case::total_ratio).collect();
+    let report = Report {
+        machine: Machine::here(),
+        bound: arguments.bound,
+        total_ratio: geometric_mean(&ratios),
+        cages,
+    };
+    print!("{}", rows::text(&report));
+    if let Some(file) = &arguments.json {
+        measure::write_json(file, &report)?;
+    }
+    Ok(())
+}
+
+fn case(name: &'static str, arguments: &Arguments) -> Result<Case> {
+    let cage = read(&arguments.cages.join(format!("table1_{name}.obj")))?;
+    let mean_edge_length = mean_edge_length(&cage);
+    let bound = arguments.bound * mean_edge_length;
+    let (features, mut errors) = (Features::of(&cage), Errors::new(&cage)?);
+    let depth = errors.classic_depth(bound)?;
+    let tolerance = errors.tolerance(&features, bound)?;
+    let same = || vec![depth; cage.positions().len()];
+    let own = || features.equal_error_depths(tolerance);
+    let (same_error, own_error) = (errors.worst(&same())?, errors.worst(&own())?);
+    let runs = usize::from(arguments.runs);
+    Ok(Case {
+        name,
+        cage: cage_counts(&cage),
+        mean_edge_length,
+        bound,
+        tolerance,
+        classic: scheme::measure(&cage, &same, same_error, runs)?,
+        adaptive: scheme::measure(&cage, &own, own_error, runs)?,
+    })
+}
+
+fn read(file: &Path) -> Result<Cage> {
+    let text = std::fs::read(file).with_context(|| {
+        let file = file.display();
+        format!("{file}: reading failed; --cages names the folder of the four cages")
+    })?;
+    read_obj(&text, CageBudget::default()).with_context(|| file.display().to_string())
+}
