@@ -1,7 +1,5 @@
 //! One patch of the tables: which points it is made of, and with positions, its sixteen controls.
 
-use std::borrow::Cow;
-
 use super::super::{
     Cap, Patch, Place, Sample,
     evaluate::{bernstein, bernstein_derivative, tensor},
@@ -18,7 +16,7 @@ use crate::{
 pub enum Entry<'a> {
     /// A bicubic B-spline patch. Unlike those of [`Tables`](super::super::Tables) its controls beyond sharp sides are
     /// [`NONE`]: twice the point on the side less the one within, columns first, then rows.
-    Patch(Cow<'a, Patch>),
+    Patch(Patch),
     /// A cap around a feature that is not refined further.
     Cap(CapEntry<'a>),
 }
@@ -29,7 +27,7 @@ pub struct CapEntry<'a> {
     pub(super) place: Place,
     pub(super) finer: u8,
     /// In the axes of its sector.
-    pub(super) cap: Cow<'a, Cap>,
+    pub(super) cap: &'a Cap,
     pub(super) turn: Turn,
     pub(super) points: Numbers<'a>,
 }

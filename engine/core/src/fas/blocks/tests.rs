@@ -265,7 +265,7 @@ fn copies_of_a_point_beside_two_features_are_equal_to_the_bit() {
                 continue;
             };
             let point = piece.controls[corner];
-            met_again += usize::from(seen.get(&at).is_some());
+            met_again += usize::from(seen.contains_key(&at));
             assert_eq!(*seen.entry(at).or_insert(point), point, "{:?}", piece.place);
         }
     }

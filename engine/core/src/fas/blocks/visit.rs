@@ -3,7 +3,7 @@
 //! First those of levels 0 and 1, face by face of the cage; then those around features, feature by feature; then those
 //! around semi-sharp lines.
 
-use std::{borrow::Cow, ops::Range};
+use std::ops::Range;
 
 use super::super::{
     Cap, Patch, Place,
@@ -82,12 +82,12 @@ impl Blocks {
                 continue;
             }
             let (controls, sharp) = self.first.patch(&self.mesh, face, corner);
-            visit(&Entry::Patch(Cow::Owned(Patch {
+            visit(&Entry::Patch(Patch {
                 place: child_place(face, corner),
                 controls,
                 finer: self.finer_children(face, corner),
                 sharp,
-            })));
+            }));
         }
     }
 
@@ -105,12 +105,12 @@ impl Blocks {
         };
         if !mesh.is_extraordinary(face) {
             let controls = own_grid(mesh, face, sharp);
-            return visit(&Entry::Patch(Cow::Owned(Patch {
+            return visit(&Entry::Patch(Patch {
                 place,
                 controls,
                 finer,
                 sharp,
-            })));
+            }));
         }
         let cap = Cap {
             place,
@@ -121,7 +121,7 @@ impl Blocks {
         visit(&Entry::Cap(CapEntry {
             place,
             finer,
-            cap: Cow::Owned(cap),
+            cap: &cap,
             turn: Turn(0),
             points: Numbers::From(0),
         }));
@@ -140,7 +140,7 @@ impl Blocks {
                 visit(&Entry::Cap(CapEntry {
                     place: child_place(face, corner),
                     finer: self.finer_children(face, corner),
-                    cap: Cow::Borrowed(&self.template(block).caps[sector]),
+                    cap: &self.template(block).caps[sector],
                     turn: Turn(corner as u8),
                     points: Numbers::Listed(inner),
                 }));
@@ -174,7 +174,7 @@ impl Blocks {
                 let controls = patch
                     .controls
                     .map(|point| if point == NONE { NONE } else { first + point });
-                visit(&Entry::Patch(Cow::Owned(Patch {
+                visit(&Entry::Patch(Patch {
                     place: place(level, [patch.place.u, patch.place.v]),
                     controls: turn.grid(controls),
                     finer: if level < depth {
@@ -183,14 +183,14 @@ impl Blocks {
                         0
                     },
                     sharp: turn.sides(patch.sharp),
-                })));
+                }));
             }
             first += template.lattice.points();
         }
         visit(&Entry::Cap(CapEntry {
             place: place(depth, [0, 0]),
             finer: 0,
-            cap: Cow::Borrowed(&template.caps[sector]),
+            cap: &template.caps[sector],
             turn,
             points: Numbers::From(first - template.lattice.points()),
         }));
@@ -201,13 +201,13 @@ impl Blocks {
             return;
         };
         for patch in &tables.render.patches {
-            visit(&Entry::Patch(Cow::Borrowed(patch)));
+            visit(&Entry::Patch(*patch));
         }
         for cap in &tables.render.caps {
             visit(&Entry::Cap(CapEntry {
                 place: cap.place,
                 finer: cap.finer,
-                cap: Cow::Borrowed(cap),
+                cap,
                 turn: Turn(0),
                 points: Numbers::From(0),
             }));
