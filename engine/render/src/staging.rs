@@ -39,7 +39,10 @@ pub(crate) struct Staging {
     /// Words of the tiles.
     pub(crate) tiles: wgpu::Buffer,
     header_bytes: Vec<u8>,
+    /// As long as the buffer, and never cleared: a tile overwrites all its words.
     words: Vec<u32>,
+    /// Words of this frame.
+    word_count: usize,
     batches: Vec<Batch>,
 }
 
@@ -55,12 +58,15 @@ impl Staging {
                 mapped_at_creation: false,
             })
         };
+        let headers = buffer("drumlin headers", size_of::<UploadHeader>());
+        let tiles = buffer("drumlin staging", UPLOAD_WORDS * 4);
         Self {
-            headers: buffer("drumlin headers", size_of::<UploadHeader>()),
-            tiles: buffer("drumlin staging", UPLOAD_WORDS * 4),
-            header_bytes: Vec::new(),
-            words: Vec::new(),
-            batches: Vec::new(),
+            header_bytes: Vec::with_capacity(host_size(&headers)),
+            words: vec![0; host_size(&tiles) / 4],
+            word_count: 0,
+            batches: Vec::with_capacity(PAGE_COUNT as usize),
+            headers,
+            tiles,
         }
     }
 
@@ -73,14 +79,15 @@ impl Staging {
         unit: f32,
     ) -> &[Batch] {
         self.header_bytes.clear();
-        self.words.clear();
+        self.word_count = 0;
         self.batches.clear();
         for page in 0..PAGE_COUNT as usize {
             self.pack_page(page, pool, uploads, unit);
         }
         if !self.batches.is_empty() {
+            let words = &self.words[..self.word_count];
             queue.write_buffer(&self.headers, 0, &self.header_bytes);
-            queue.write_buffer(&self.tiles, 0, bytemuck::cast_slice(&self.words));
+            queue.write_buffer(&self.tiles, 0, bytemuck::cast_slice(words));
         }
         &self.batches
     }
@@ -93,12 +100,9 @@ impl Staging {
     fn pack_page(&mut self, page: usize, pool: &Pool, uploads: &[Upload], unit: f32) {
         self.header_bytes
             .resize(self.header_bytes.len().next_multiple_of(ALIGNMENT), 0);
-        self.words
-            .resize(self.words.len().next_multiple_of(ALIGNMENT / 4), 0);
-        let (header_offset, tile_offset) = (
-            offset(self.header_bytes.len()),
-            offset(self.words.len() * 4),
-        );
+        self.word_count = self.word_count.next_multiple_of(ALIGNMENT / 4);
+        let (header_offset, tile_offset) =
+            (offset(self.header_bytes.len()), offset(self.word_count * 4));
         let mut count = 0;
         for upload in uploads {
             let Some((_, slot)) = pool.place(upload.slot).filter(|place| place.0 == page) else {
@@ -113,12 +117,12 @@ impl Staging {
                     step: upload.step,
                     reserved_2: [0.0; 2],
                 }));
-            let start = self.words.len();
-            self.words.resize(start + UPLOAD_WORDS, 0);
-            stage_tile(&upload.tile, &mut self.words[start..]);
+            let words = &mut self.words[self.word_count..][..UPLOAD_WORDS];
+            stage_tile(&upload.tile, words);
             if let Some(cut) = &upload.cut {
-                self.words[start + UPLOAD_CUT_WORD..start + UPLOAD_WORDS].copy_from_slice(&cut[..]);
+                words[UPLOAD_CUT_WORD..].copy_from_slice(&cut[..]);
             }
+            self.word_count += UPLOAD_WORDS;
             count += 1;
         }
         if count > 0 {
@@ -130,6 +134,11 @@ impl Staging {
             });
         }
     }
+}
+
+/// Bytes of a buffer, as memory beside it counts them.
+fn host_size(buffer: &wgpu::Buffer) -> usize {
+    usize::try_from(buffer.size()).unwrap_or(usize::MAX)
 }
 
 /// Offsets stay below a few megabytes.

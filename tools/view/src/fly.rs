@@ -19,9 +19,10 @@ use crate::{
     depth_frames,
     frames::{FrameWriter, Wanted},
     path::{self, Path},
-    report::{About, FrameRow, Report, Start},
+    report::{About, FrameRow, Report},
     scene::{Debug, Scene},
-    stopwatch::{Span, Stopwatch, millis},
+    start::Start,
+    stopwatch::{Span, Stopwatch},
 };
 
 /// Frames after the last one in which its late numbers come back from the device.
@@ -34,6 +35,9 @@ pub(crate) fn run(arguments: &FlyArguments, process_start: Instant) -> Result<Ou
     if let Some(file) = &arguments.save_path {
         std::fs::write(file, path::to_json(&keys)?)
             .with_context(|| format!("{}: writing failed", file.display()))?;
+    }
+    if let Some(folder) = &arguments.depth_frames {
+        make_folder(folder)?;
     }
     let path = Path::new(&keys, &data.frame())?;
     let count = frame_count(&path, arguments.fps);
@@ -65,7 +69,6 @@ fn pace(arguments: &FlyArguments) -> Pace {
 /// A flight under way.
 struct Flight<'a> {
     arguments: &'a FlyArguments,
-    process_start: Instant,
     start: Start,
     headless: Headless,
     offscreen: Offscreen,
@@ -87,20 +90,12 @@ impl<'a> Flight<'a> {
         frame_count: u32,
         process_start: Instant,
     ) -> Result<Self> {
-        if let Some(folder) = &arguments.depth_frames {
-            make_folder(folder)?;
-        }
         let Size(size) = arguments.terrain.size;
         let wanted = Wanted {
             frames: arguments.frames.clone(),
             contact_sheet: arguments.contact_sheet.clone(),
         };
-        let before = Instant::now();
-        let headless = Headless::new()?;
-        let start = Start {
-            device_millis: millis(before.elapsed()),
-            ..Start::default()
-        };
+        let (headless, start) = Start::with_device(process_start)?;
         let (device, queue) = (&headless.device, &headless.queue);
         let scene = Scene::open(
             data,
@@ -121,7 +116,6 @@ impl<'a> Flight<'a> {
             bytes_read: 0,
             last_view: None,
             arguments,
-            process_start,
             start,
             headless,
             scene,
@@ -221,11 +215,9 @@ impl<'a> Flight<'a> {
 
     /// Waits for the first frame with terrain, once a flight, and says when it was there.
     fn note_first_picture(&mut self) -> Result<()> {
-        let has_terrain = self.scene.report().stats.tiles_drawn > 0;
-        if self.start.first_picture_millis.is_none() && has_terrain {
+        if !self.start.is_over() && self.scene.report().stats.tiles_drawn > 0 {
             self.headless.finish()?;
-            let since = millis(self.process_start.elapsed());
-            self.start.first_picture_millis = Some(since - self.start.device_millis);
+            self.start.end();
         }
         Ok(())
     }

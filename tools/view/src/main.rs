@@ -15,6 +15,7 @@ mod report;
 mod scene;
 mod screen;
 mod sky;
+mod start;
 mod stopwatch;
 mod view;
 mod viewer;

@@ -6,7 +6,10 @@ use anyhow::{Context, Result};
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::stopwatch::{Span, millis};
+use crate::{
+    start::Start,
+    stopwatch::{Span, millis},
+};
 
 /// Said once a flight.
 #[derive(Debug, Serialize)]
@@ -23,15 +26,6 @@ pub(crate) struct About {
     pub(crate) settings: Value,
     /// How it began.
     pub(crate) start: Start,
-}
-
-/// From the process's start to the first picture, milliseconds by the wall clock.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-pub(crate) struct Start {
-    /// Making the device: the driver's own work.
-    pub(crate) device_millis: f64,
-    /// Everything else, until the device had finished the first frame that shows terrain; null where none does.
-    pub(crate) first_picture_millis: Option<f64>,
 }
 
 /// Patches drawn, by depth; `regular` have no finer neighbour, `transition` have.
@@ -102,15 +96,6 @@ struct Totals {
     triangles: u64,
     bytes_read: u64,
     bytes_uploaded: u64,
-}
-
-impl Start {
-    fn line(self) -> String {
-        let device = self.device_millis;
-        self.first_picture_millis.map_or_else(String::new, |first| {
-            format!("first picture after {first:.0} ms, beside {device:.0} ms for the device\n")
-        })
-    }
 }
 
 impl FrameRow {

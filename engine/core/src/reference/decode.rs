@@ -34,7 +34,8 @@ const LIMIT_WEIGHTS: [[i32; 4]; 4] = [
 /// When `words` is shorter, or the tile's parts are not of their fixed sizes.
 pub fn stage_tile(tile: &Tile, words: &mut [u32]) {
     let words = &mut words[..UPLOAD_WORDS];
-    words.fill(0);
+    // What lies before is overwritten whole; from here on bytes and bits are put into zeros.
+    words[UPLOAD_VOIDS_WORD..].fill(0);
     for (word, &control) in words[UPLOAD_CONTROLS_WORD..]
         .iter_mut()
         .zip(&tile.controls[..CAGE_CONTROL_COUNT])
