@@ -17,21 +17,23 @@ fn ground() -> RefineGround {
 
 /// Corners, sides and the middle of every piece.
 fn sites(tables: &Tables) -> Vec<RefineSite> {
-    let patches = (0..tables.render.patches.len()).map(|patch| Piece::Patch(patch as u32));
-    let caps = (0..tables.render.caps.len()).map(|cap| Piece::Cap(cap as u32));
+    let patches = (0..)
+        .zip(&tables.render.patches)
+        .map(|(at, _)| Piece::Patch(at));
+    let caps = (0..).zip(&tables.render.caps).map(|(at, _)| Piece::Cap(at));
     let places = [[0.0, 0.0], [1.0, 1.0], [0.5, 0.0], [0.25, 0.625]];
-    let mut sites = Vec::new();
-    for piece in patches.chain(caps) {
-        for uv in places {
-            sites.push(RefineSite {
-                piece,
-                uv,
-                offset: None,
-                position_of: sites.len() as u32,
-            });
-        }
-    }
-    sites
+    let wanted = patches
+        .chain(caps)
+        .flat_map(|piece| places.map(|uv| (piece, uv)));
+    (0..)
+        .zip(wanted)
+        .map(|(position_of, (piece, uv))| RefineSite {
+            piece,
+            uv,
+            offset: None,
+            position_of,
+        })
+        .collect()
 }
 
 /// f32 against f64: coordinates below 2 and a few dozen roundings, 1e-6; normals of patches an eighth of an edge wide

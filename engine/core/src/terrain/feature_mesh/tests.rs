@@ -103,11 +103,11 @@ fn normals_are_unit_and_lie_with_their_triangles() {
     }
     let mut wrong = 0;
     for triangle in mesh.indices.chunks_exact(3) {
-        let [a, b, c] = [0, 1, 2].map(|i| glam::Vec3::from(mesh.positions[triangle[i] as usize]));
+        let [a, b, c] = [0, 1, 2].map(|i| Vec3::from(mesh.positions[triangle[i] as usize]));
         let face = (b - a).cross(c - a).normalize_or_zero();
         let turned = triangle
             .iter()
-            .any(|&corner| glam::Vec3::from(mesh.normals[corner as usize]).dot(face) < 0.3);
+            .any(|&corner| Vec3::from(mesh.normals[corner as usize]).dot(face) < 0.3);
         wrong += usize::from(turned);
     }
     assert!(wrong * 200 < mesh.indices.len() / 3, "{wrong} triangles");
