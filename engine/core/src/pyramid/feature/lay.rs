@@ -1,8 +1,10 @@
 //! Laying: an authored cage becomes a cut in the finest level's patches and the cage that fills it.
 //!
-//! 1. place the cage's vertices in samples and units;  2. find the cut around them;  3. put the rim on the ground, which
-//! must not be void there;  4. lattice quads, zipper and authored faces become one cage;  5. measure how far it is from
-//! the ground.
+//! 1. place the cage's vertices in samples and units;
+//! 2. find the cut around them;
+//! 3. put the rim on the ground, which must not be void there;
+//! 4. lattice quads, zipper and authored faces become one cage;
+//! 5. measure how far it is from the ground.
 
 use super::plan::{self, PLAN_STEPS, Point};
 use super::region::Region;
