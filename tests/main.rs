@@ -6,6 +6,7 @@ mod embed;
 mod features;
 mod flight;
 mod gpu_parity;
+mod imagery;
 mod layers;
 mod shared_structs;
 mod support;

@@ -26,12 +26,14 @@
 @group(2) @binding(3) var<storage, read> feature_place: FeaturePlace;
 
 const COLOR_TEXELS: f32 = 256.0;    // a side of a layer; the first and last lie on the tile's border
+const MOST_TAPS: f32 = 8.0;
 
 struct Vertex {
     @builtin(position) @invariant clip: vec4f,
     @location(0) position: vec3f,   // camera-relative metres
     @location(1) view_depth: f32,   // metres along the view axis
     @location(2) @interpolate(flat) tile: u32,
+    @location(3) @interpolate(flat) per_metre: vec2f,   // layer's sides a metre of the tile's imagery
 }
 
 fn vertex_position(index: u32) -> vec3f {
@@ -53,11 +55,18 @@ fn clip_position(position: vec3f) -> vec4f {
     return frame.clip_from_view_world * vec4f(position, 1.0);
 }
 
+// Sides of its layer that imagery takes a metre, east and north.
+fn imagery_per_metre(tile: u32) -> vec2f {
+    let texel_share = (COLOR_TEXELS - 1.0) / COLOR_TEXELS;
+    return texel_share * tiles[tile].color_scale / (f32(TILE_CELLS) * tiles[tile].step);
+}
+
 @vertex
 fn vertex(@builtin(vertex_index) index: u32) -> Vertex {
     let position = vertex_position(index);
     let clip = clip_position(position);
-    return Vertex(clip, position, clip.w, index >> SAMPLE_BITS);
+    let tile = index >> SAMPLE_BITS;
+    return Vertex(clip, position, clip.w, tile, imagery_per_metre(tile));
 }
 
 struct FeaturePoint {
@@ -65,7 +74,8 @@ struct FeaturePoint {
     @location(0) position: vec3f,   // camera-relative metres
     @location(1) view_depth: f32,   // metres along the view axis
     @location(2) @interpolate(flat) tile: u32,
-    @location(3) normal: vec3f,     // outward
+    @location(3) @interpolate(flat) per_metre: vec2f,   // as a vertex of the ground
+    @location(4) normal: vec3f,     // outward
 }
 
 @vertex
@@ -86,13 +96,43 @@ fn feature_vertex(@builtin(vertex_index) index: u32) -> FeaturePoint {
         normal = feature_vertices[index].normal;
     }
     let clip = clip_position(position);
-    return FeaturePoint(clip, position, clip.w, tile, normal);
+    return FeaturePoint(clip, position, clip.w, tile, imagery_per_metre(tile), normal);
 }
 
-fn imagery(tile: u32, at: vec2f) -> vec3f {
-    let share = at / f32(TILE_CELLS) * tiles[tile].color_scale + tiles[tile].color_offset;
-    let texel = (share * (COLOR_TEXELS - 1.0) + 0.5) / COLOR_TEXELS;
-    return textureSampleLevel(color_layers, color_sampler, texel, tiles[tile].color_slot, 0.0).rgb;
+// How far on the ground it is to the next pixel, metres.
+struct Spread {
+    right: vec2f,
+    down: vec2f,
+    per_metre: vec2f,               // the vertex's
+}
+
+fn spread_of(position: vec3f, per_metre: vec2f) -> Spread {
+    return Spread(dpdx(position.xy), dpdy(position.xy), per_metre);
+}
+
+// Colour weighed by alpha, and alpha: 0 where there is no picture. Where a pixel covers more texels in one direction than
+// across it, the mean of up to MOST_TAPS in a row, each as wide as the pixel is across (samplers do this too, but not all
+// of them rightly).
+fn imagery(here: Place, spread: Spread) -> vec4f {
+    let scale = tiles[here.tile].color_scale;
+    // Pixels beside a triangle, which only serve derivatives, may read zeros from buffers, and a driver may choose the
+    // texels' size for four pixels by one of those: it then goes by what came with the vertex.
+    let per_metre = select(spread.per_metre, imagery_per_metre(here.tile), scale > 0.0);
+    let right = spread.right * per_metre;
+    let down = spread.down * per_metre;
+    let along = select(down, right, dot(right, right) > dot(down, down));
+    let long = length(along);
+    let wide = abs(right.x * down.y - right.y * down.x) / max(long, 1.0e-9);
+    let taps = clamp(ceil(long / max(wide, 1.0 / COLOR_TEXELS)), 1.0, MOST_TAPS);
+    let version = log2(max(long / taps * COLOR_TEXELS, 1.0));
+    let share = here.at / f32(TILE_CELLS) * scale + tiles[here.tile].color_offset;
+    let middle = (share * (COLOR_TEXELS - 1.0) + 0.5) / COLOR_TEXELS;
+    var sum = vec4f(0.0);
+    for (var tap = 0.5; tap < taps; tap += 1.0) {
+        let texel = middle + (tap / taps - 0.5) * along;
+        sum += textureSampleLevel(color_layers, color_sampler, texel, tiles[here.tile].color_slot, version);
+    }
+    return sum / taps;
 }
 
 // The depths of the frame were lessened by this.
@@ -136,27 +176,29 @@ fn wire(here: Place, per_pixel: vec2f) -> f32 {
 }
 
 // The ground's colour in the light, before air.
-fn ground_color(here: Place, height: f32) -> vec3f {
+fn ground_color(here: Place, height: f32, spread: Spread) -> vec3f {
     let slope = ground_slope(here.tile, here.at);
     let normal = normalize(vec3f(-slope, 1.0));
     if (frame.flags & FLAG_DEPTH_COLORS) != 0u {
         let depth = word_depth(patch_word_at(here), drawn_shift());
         return lit(depth_color(depth, tiles[here.tile].level), normal, frame.sun);
     }
-    return surface_color(here, height, normal);
+    return surface_color(here, height, normal, spread);
 }
 
 // The feature's colour in the light, before air.
-fn surface_color(here: Place, height: f32, normal: vec3f) -> vec3f {
+fn surface_color(here: Place, height: f32, normal: vec3f, spread: Spread) -> vec3f {
     if (frame.flags & FLAG_DEPTH_COLORS) != 0u {
         return lit(depth_color(FINEST_DEPTH, tiles[here.tile].level), normal, frame.sun);
     }
+    var picture = vec4f(0.0);
     if tiles[here.tile].color_slot != NONE {
-        return softly_lit(imagery(here.tile, here.at), normal, frame.sun);
+        picture = imagery(here, spread);
     }
     let range = max(frame.height_range.y - frame.height_range.x, 1.0);
     let share = (height - frame.height_range.x) / range;
-    return lit(natural_color(share, normal), normal, frame.sun);
+    let bare = lit(natural_color(share, normal), normal, frame.sun);
+    return softly_lit(picture.rgb, normal, frame.sun) + (1.0 - picture.a) * bare;
 }
 
 // Tiles reach past the data set; nothing is drawn there.
@@ -176,7 +218,8 @@ fn through_air(surface: vec3f, position: vec3f) -> vec4f {
 fn feature_color(in: FeaturePoint) -> @location(0) vec4f {
     let here = locate(in.tile, in.position.xy);
     let height = in.position.z + frame.camera_height;
-    return through_air(surface_color(here, height, normalize(in.normal)), in.position);
+    let color = surface_color(here, height, normalize(in.normal), spread_of(in.position, in.per_metre));
+    return through_air(color, in.position);
 }
 
 @fragment
@@ -186,14 +229,15 @@ fn feature_depth_image(in: FeaturePoint) -> @location(0) f32 {
 
 @fragment
 fn color(in: Vertex) -> @location(0) vec4f {
-    let per_pixel_metres = max(fwidth(in.position.xy), vec2f(1.0e-9));
+    let spread = spread_of(in.position, in.per_metre);
     if is_outside(in.position.xy) {
         discard;
     }
     let here = locate(in.tile, in.position.xy);
-    var result = ground_color(here, in.position.z + frame.camera_height);
+    var result = ground_color(here, in.position.z + frame.camera_height, spread);
     if (frame.flags & FLAG_WIREFRAME) != 0u {
-        let edge = wire(here, per_pixel_metres / abs(tiles[here.tile].step));
+        let per_pixel = max(abs(spread.right) + abs(spread.down), vec2f(1.0e-9));
+        let edge = wire(here, per_pixel / abs(tiles[here.tile].step));
         result = mix(result, vec3f(0.01), 0.6 * edge);
     }
     return through_air(result, in.position);

@@ -1,10 +1,13 @@
 //! Imagery on the device: one array texture, a layer a tile.
 
-use drumlin_core::terrain::{ColorUpload, PoolSizes};
-
-use crate::vram::LAYER_BYTES;
+use drumlin_core::{
+    stream::COLOR_BYTES,
+    terrain::{ColorUpload, PoolSizes},
+};
 
 const SIDE: u32 = 256;
+/// A layer and its smaller versions: 256², 128², … 1.
+const VERSIONS: u32 = SIDE.ilog2() + 1;
 
 /// Layers of imagery, and how they are sampled.
 pub(crate) struct ColorPool {
@@ -23,7 +26,7 @@ impl ColorPool {
                 height: SIDE,
                 depth_or_array_layers: layers.clamp(1, PoolSizes::MAX_COLOR_LAYERS),
             },
-            mip_level_count: 1,
+            mip_level_count: VERSIONS,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
             format: wgpu::TextureFormat::Rgba8UnormSrgb,
@@ -38,6 +41,7 @@ impl ColorPool {
             label: Some("drumlin imagery"),
             mag_filter: wgpu::FilterMode::Linear,
             min_filter: wgpu::FilterMode::Linear,
+            mipmap_filter: wgpu::MipmapFilterMode::Linear,
             ..Default::default()
         });
         Self {
@@ -49,32 +53,39 @@ impl ColorPool {
 
     /// Puts imagery into its layer; one of the wrong size or past the last layer is not put up.
     pub(crate) fn upload(&self, queue: &wgpu::Queue, upload: &ColorUpload) {
-        let layer = self.texture.size().depth_or_array_layers;
-        if upload.texels.len() as u64 != LAYER_BYTES || upload.layer >= layer {
+        let layers = self.texture.size().depth_or_array_layers;
+        if upload.texels.len() as u64 != COLOR_BYTES || upload.layer >= layers {
             return;
         }
-        let origin = wgpu::Origin3d {
-            x: 0,
-            y: 0,
-            z: upload.layer,
+        let mut offset = 0;
+        for version in 0..VERSIONS {
+            self.write(queue, upload, version, offset);
+            offset += u64::from(SIDE >> version).pow(2) * 4;
+        }
+    }
+
+    /// Puts one version, whose texels begin at `offset`, into its layer.
+    fn write(&self, queue: &wgpu::Queue, upload: &ColorUpload, version: u32, offset: u64) {
+        let side = SIDE >> version;
+        let target = wgpu::TexelCopyTextureInfo {
+            mip_level: version,
+            origin: wgpu::Origin3d {
+                z: upload.layer,
+                ..wgpu::Origin3d::ZERO
+            },
+            ..self.texture.as_image_copy()
         };
-        queue.write_texture(
-            wgpu::TexelCopyTextureInfo {
-                origin,
-                ..self.texture.as_image_copy()
-            },
-            &upload.texels,
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(SIDE * 4),
-                rows_per_image: Some(SIDE),
-            },
-            wgpu::Extent3d {
-                width: SIDE,
-                height: SIDE,
-                depth_or_array_layers: 1,
-            },
-        );
+        let rows = wgpu::TexelCopyBufferLayout {
+            offset,
+            bytes_per_row: Some(side * 4),
+            rows_per_image: Some(side),
+        };
+        let size = wgpu::Extent3d {
+            width: side,
+            height: side,
+            depth_or_array_layers: 1,
+        };
+        queue.write_texture(target, &upload.texels, rows, size);
     }
 
     /// What the draw stage binds.
@@ -84,6 +95,6 @@ impl ColorPool {
 
     /// Bytes on the device.
     pub(crate) fn byte_count(&self) -> u64 {
-        u64::from(self.texture.size().depth_or_array_layers) * LAYER_BYTES
+        u64::from(self.texture.size().depth_or_array_layers) * COLOR_BYTES
     }
 }

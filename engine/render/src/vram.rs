@@ -5,13 +5,12 @@
 use drumlin_core::{
     pyramid::PyramidError,
     reference::shared::{DrawnTile, Frame, SLOT_WORDS},
+    stream::COLOR_BYTES,
     terrain::PoolSizes,
 };
 
 /// Bytes of a slot: one decoded tile.
 pub(crate) const SLOT_BYTES: u64 = SLOT_WORDS as u64 * 4;
-/// Bytes of a layer of imagery: 256 × 256 RGBA.
-pub(crate) const LAYER_BYTES: u64 = 256 * 256 * 4;
 /// Tiles decoded at once; more in one frame are decoded in submissions of their own.
 pub(crate) const UPLOADS_AT_ONCE: u32 = 16;
 /// Bytes of a tile on its way up: header, controls, codes, voids and patch errors in words, rounded up.
@@ -24,7 +23,7 @@ const DRAWN_BYTES: u64 = size_of::<DrawnTile>() as u64 + 3 * 4096;
 /// Bytes on the device of a terrain of these sizes, all pages made.
 pub(crate) fn byte_count(sizes: &PoolSizes) -> u64 {
     u64::from(sizes.slots) * SLOT_BYTES
-        + u64::from(sizes.color_layers.max(1)) * LAYER_BYTES
+        + u64::from(sizes.color_layers.max(1)) * COLOR_BYTES
         + u64::from(sizes.max_drawn) * DRAWN_BYTES
         + u64::from(sizes.index_capacity) * 4
         + 2 * u64::from(UPLOADS_AT_ONCE) * UPLOAD_BYTES

@@ -6,6 +6,7 @@ pub mod build;
 mod error;
 pub mod feature;
 mod files;
+pub(crate) mod light;
 mod metadata;
 mod patch_code;
 mod reader;

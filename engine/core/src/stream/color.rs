@@ -9,9 +9,6 @@ use std::sync::Arc;
 use super::{CutRule, NO_NODE, Tree, Wanted};
 use crate::{geo::TILE_CELLS, pyramid::Metadata};
 
-/// Bytes of a picture: 256 × 256 texels of four bytes.
-pub const COLOR_BYTES: u64 = 256 * 256 * 4;
-
 /// Where a tile's picture is.
 #[derive(Clone, Debug)]
 pub enum ColorLife {

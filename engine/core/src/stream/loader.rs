@@ -16,7 +16,7 @@ use std::{
 
 use crossbeam::channel::{Receiver, Sender, bounded};
 
-use super::TileSource;
+use super::{TileSource, picture};
 use crate::{
     geo::TileId,
     pyramid::{PyramidError, Summary, Tile, feature::FeatureGroup},
@@ -39,7 +39,7 @@ pub enum Job {
 pub enum Loaded {
     /// A tile, and the features that stand in the place of some of its patches.
     Tile(Arc<Tile>, Arc<[FeatureGroup]>),
-    /// Imagery, or that there is none.
+    /// Imagery as [`picture`] makes it, or that there is none.
     Color(Option<Arc<[u8]>>),
     /// An error, of a tile or of imagery.
     Failed(PyramidError),
@@ -189,7 +189,7 @@ fn serve(
 fn read(source: &dyn TileSource, request: &Request) -> Loaded {
     let loaded = match &request.job {
         Job::Tile(parent) => read_tile(source, request.id, parent.as_deref()),
-        Job::Color => source.load_color(request.id).map(Loaded::Color),
+        Job::Color => read_color(source, request.id),
     };
     loaded.unwrap_or_else(Loaded::Failed)
 }
@@ -207,6 +207,17 @@ fn read_tile(
         Vec::new()
     };
     Ok(Loaded::Tile(Arc::new(tile), features.into()))
+}
+
+fn read_color(source: &dyn TileSource, id: TileId) -> Result<Loaded, PyramidError> {
+    let Some(texels) = source.load_color(id)? else {
+        return Ok(Loaded::Color(None));
+    };
+    let picture = picture(&texels).ok_or_else(|| PyramidError::Tile {
+        tile: id,
+        what: format!("imagery of {} bytes and not 256 × 256 × 4", texels.len()),
+    })?;
+    Ok(Loaded::Color(Some(picture)))
 }
 
 #[cfg(test)]

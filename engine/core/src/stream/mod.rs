@@ -17,6 +17,7 @@ mod cut;
 mod loader;
 mod motion;
 mod neighbours;
+mod picture;
 mod residency;
 mod schedule;
 mod source;
@@ -27,11 +28,12 @@ mod view;
 
 pub use balance::{Drawn, Leaf};
 pub use budget::{Relaxation, TILE_BYTES};
-pub use color::{COLOR_BYTES, ColorLife, ColorPool};
+pub use color::{ColorLife, ColorPool};
 pub use cut::{CutLimit, CutRule, Wanted};
 pub use loader::{Job, Loaded, Loader, Ticket};
 pub use motion::Motion;
 pub use neighbours::{Neighbours, Side, neighbours};
+pub use picture::{COLOR_BYTES, picture};
 pub(crate) use residency::Residency;
 pub use residency::SlotPool;
 #[cfg(test)]

@@ -181,10 +181,8 @@ impl Scheduler {
             return;
         }
         match texels {
-            Some(texels) if texels.len() as u64 == COLOR_BYTES => {
-                colors.arrive(tree, place, texels);
-            }
-            _ => tree.node_mut(place).color = ColorLife::Nothing,
+            Some(texels) => colors.arrive(tree, place, texels),
+            None => tree.node_mut(place).color = ColorLife::Nothing,
         }
     }
 

@@ -21,7 +21,7 @@ pub trait TileSource: Send + Sync {
     /// What went wrong with this tile; the next try may succeed.
     fn load(&self, id: TileId, parent: Option<&Tile>) -> Result<Tile, PyramidError>;
 
-    /// Reads the imagery of one tile: 256 × 256 RGBA, sRGB; none where there is no imagery.
+    /// Reads the imagery of one tile: 256 × 256 RGBA, sRGB, alpha not multiplied in; none where there is no imagery.
     ///
     /// # Errors
     ///

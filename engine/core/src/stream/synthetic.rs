@@ -206,7 +206,9 @@ impl TileSource for Synthetic {
 
     fn load_color(&self, id: TileId) -> Result<Option<Arc<[u8]>>, PyramidError> {
         self.read(id)?;
-        Ok(Some(vec![id.level; 256 * 256 * 4].into()))
+        Ok(Some(
+            [id.level, id.level, id.level, 255].repeat(256 * 256).into(),
+        ))
     }
 
     fn has_features(&self) -> bool {

@@ -53,7 +53,7 @@ pub struct FeatureDraw {
 pub struct ColorUpload {
     /// Layer of the colour pool.
     pub layer: u32,
-    /// 256 × 256 RGBA, sRGB.
+    /// 256 × 256 RGBA and smaller versions, as [`picture`](crate::stream::picture) makes them.
     pub texels: Arc<[u8]>,
 }
 

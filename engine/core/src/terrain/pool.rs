@@ -4,6 +4,7 @@ use crate::{
     geo::PATCH_COUNT,
     pyramid::PyramidError,
     reference::shared::{DrawnTile, SLOT_WORDS, SLOTS_PER_PAGE},
+    stream::COLOR_BYTES,
 };
 
 /// What the GPU's buffers hold; whoever makes them makes them of these sizes, once.
@@ -30,8 +31,6 @@ impl PoolSizes {
     /// The least number of slots.
     pub const MIN_SLOTS: u32 = 64;
     const MAX_INDEX_BYTES: u64 = 128 << 20;
-    /// A picture of 256 × 256 texels and its smaller versions.
-    const LAYER_BYTES: u64 = 4 * 87_381;
     const SLOT_BYTES: u64 = 4 * SLOT_WORDS as u64;
     /// Per drawn tile: its struct and three words a patch.
     const DRAWN_BYTES: u64 = size_of::<DrawnTile>() as u64 + 3 * 4 * PATCH_COUNT as u64;
@@ -46,11 +45,11 @@ impl PoolSizes {
         let quarter = vram_budget_bytes / 4;
         let index_bytes = quarter.min(Self::MAX_INDEX_BYTES);
         let layers = if has_imagery {
-            (quarter / Self::LAYER_BYTES).min(u64::from(Self::MAX_COLOR_LAYERS))
+            (quarter / COLOR_BYTES).min(u64::from(Self::MAX_COLOR_LAYERS))
         } else {
             0
         };
-        let rest = vram_budget_bytes - index_bytes - layers * Self::LAYER_BYTES;
+        let rest = vram_budget_bytes - index_bytes - layers * COLOR_BYTES;
         let slots = rest / (Self::SLOT_BYTES + Self::DRAWN_BYTES);
         let slots = slots.min(u64::from(Self::PAGES * SLOTS_PER_PAGE));
         if slots < u64::from(Self::MIN_SLOTS) {
@@ -73,7 +72,7 @@ impl PoolSizes {
     #[must_use]
     pub fn byte_count(&self) -> u64 {
         u64::from(self.slots) * (Self::SLOT_BYTES + Self::DRAWN_BYTES)
-            + u64::from(self.color_layers) * Self::LAYER_BYTES
+            + u64::from(self.color_layers) * COLOR_BYTES
             + 4 * u64::from(self.index_capacity)
     }
 }

@@ -3,15 +3,15 @@
 //! Texel (i, j) of a tile lies at i / 255 and j / 255 of its sides, so a level's texels form one lattice of 255 steps a
 //! tile, and every second step of a level is a step of the next coarser one. Means are taken of linear light.
 
-use std::sync::LazyLock;
-
 use rayon::prelude::*;
 
 use super::options::{Imagery, Stage, Watch};
 use crate::dem::Image;
 use crate::geo::{Extent, Grid, TILE_CELLS, TileId};
 use crate::pyramid::{
-    COLOR_TEXELS, ColorMetadata, PyramidError, PyramidWriter, ShardInfo, shard_count,
+    COLOR_TEXELS, ColorMetadata, PyramidError, PyramidWriter, ShardInfo,
+    light::{LINEAR, encode},
+    shard_count,
 };
 
 /// Steps of the lattice across a tile.
@@ -297,38 +297,6 @@ impl<'a> Shrunk<'a> {
     }
 }
 
-/// Linear light of each stored value (sRGB, IEC 61966-2-1).
-static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
-    let mut table = [0.0; 256];
-    for (value, light) in (0_u8..=255).zip(&mut table) {
-        let value = f64::from(value) / 255.0;
-        let linear = if value <= 0.040_45 {
-            value / 12.92
-        } else {
-            ((value + 0.055) / 1.055).powf(2.4)
-        };
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "eight bits are kept in the end"
-        )]
-        let linear = linear as f32;
-        *light = linear;
-    }
-    table
-});
-
-/// The stored value whose light is nearest.
-fn encode(light: f32) -> u8 {
-    let above = LINEAR.partition_point(|linear| *linear < light).min(255);
-    let below = above.saturating_sub(1);
-    let nearest = if light - LINEAR[below] < LINEAR[above] - light {
-        below
-    } else {
-        above
-    };
-    u8::try_from(nearest).unwrap_or(u8::MAX)
-}
-
 #[cfg(test)]
 #[expect(clippy::cast_possible_truncation, reason = "test pictures wrap")]
 mod tests {
@@ -355,11 +323,6 @@ mod tests {
             extent: None,
             crs: Crs::unknown(),
         }
-    }
-
-    #[test]
-    fn every_stored_value_survives_linear_light() {
-        assert!((0..=255_u8).all(|value| encode(LINEAR[usize::from(value)]) == value));
     }
 
     #[test]
