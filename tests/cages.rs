@@ -333,18 +333,18 @@ fn features_that_do_not_fit_are_told_in_one_line_and_leave_nothing() {
         &format!("position {} {} ground", VOID[0], VOID[1]),
     );
     let out = folder.join("out.zarr");
-    for (code, files, what) in [
-        (2, vec![&arch, &twin], "are laid on one spot"),
-        (2, vec![&away], "is outside the terrain"),
-        (2, vec![&edge], "past the data"),
-        (2, vec![&high], "heights are smaller than"),
-        (2, vec![&large], "past the data"),
-        (1, vec![&nowhere], "does not say where it stands"),
-        (2, vec![&void], "there is no ground under"),
+    for (files, what) in [
+        (vec![&arch, &twin], "are laid on one spot"),
+        (vec![&away], "is outside the terrain"),
+        (vec![&edge], "past the data"),
+        (vec![&high], "heights are smaller than"),
+        (vec![&large], "past the data"),
+        (vec![&nowhere], "does not say where it stands"),
+        (vec![&void], "there is no ground under"),
     ] {
         let mut arguments = args!["build", &rainier(), "-o", &out, "--features"].to_vec();
         arguments.extend(files.iter().map(|file| file.as_os_str().to_owned()));
-        let line = drumlin_fails(code, arguments);
+        let line = drumlin_fails(1, arguments);
         assert!(line.contains(what), "{line}");
         let names = fs::read_dir(&folder).expect("the folder can be read");
         let names: Vec<_> = names

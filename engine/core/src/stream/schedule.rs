@@ -63,9 +63,7 @@ pub struct Scheduler {
     behind: bool,
 }
 
-/// Tries after which a plan that waits for its tiles goes on without one; [`FrameStats::given_up`] counts those.
-///
-/// [`FrameStats::given_up`]: crate::terrain::FrameStats::given_up
+/// Tries after which a plan that waits for its tiles goes on without one, and counts it as given up.
 pub(crate) const PATIENCE: u32 = 8;
 
 impl Scheduler {
