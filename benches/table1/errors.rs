@@ -5,22 +5,39 @@
 
 use std::collections::HashMap;
 
-use anyhow::{Result, ensure};
+use anyhow::Result;
 use drumlin_core::{
-    cage::{self, Cage, LimitSurface},
-    fas::{Blocks, Features, MAX_DEPTH, Piece, Place, Positions},
+    cage::{self, Cage, LimitSample, LimitSurface},
+    fas::{Blocks, MAX_DEPTH, Piece, Place, Positions},
 };
 
 /// Places along each side of a cap at which it is measured.
 const PLACES: u32 = 8;
-/// Halvings of the interval, of logarithms, that the tolerance lies in.
-const HALVINGS: usize = 30;
 
 /// Distances of a cage's caps from the limit.
 pub(crate) struct Errors<'a> {
     cage: &'a Cage,
     limit: LimitSurface<'a>,
     known: HashMap<Place, f64>,
+}
+
+/// What one feature's caps are off by.
+pub(crate) struct FeatureErrors {
+    vertex: u32,
+    /// At depths from 1 on.
+    by_depth: Vec<f64>,
+}
+
+/// The least depth for each feature at which its own caps are within `bound`, its greatest where none is; one depth a
+/// vertex.
+pub(crate) fn depths_within(bound: f64, features: &[FeatureErrors], vertices: usize) -> Vec<u8> {
+    let mut depths = vec![0; vertices];
+    for feature in features {
+        let errors = &feature.by_depth;
+        let above = errors.iter().take_while(|&&error| error > bound).count();
+        depths[feature.vertex as usize] = (above + 1).min(errors.len()) as u8;
+    }
+    depths
 }
 
 /// A cage's tables at these depths, one a vertex.
@@ -62,31 +79,38 @@ impl<'a> Errors<'a> {
     /// The least depth that, given to all features, keeps the worst error within `bound`.
     pub(crate) fn classic_depth(&mut self, bound: f64) -> Result<u8> {
         for depth in 1..=MAX_DEPTH {
-            if self.worst(&vec![depth; self.cage.positions().len()])? <= bound {
+            let worst = self.worst(&vec![depth; self.cage.positions().len()])?;
+            if worst <= bound {
                 return Ok(depth);
             }
         }
         anyhow::bail!("no depth up to {MAX_DEPTH} keeps the error within {bound:e}")
     }
 
-    /// The greatest tolerance, to one part in a million or so, at which the depth rule keeps the worst error within
-    /// `bound`.
-    pub(crate) fn tolerance(&mut self, features: &Features, bound: f64) -> Result<f64> {
-        let (mut least, mut greatest) = (bound * 1e-6, bound * 1e6);
-        let at_least = self.worst(&features.equal_error_depths(least))?;
-        ensure!(
-            at_least <= bound,
-            "the rule's greatest depths leave an error of {at_least:e}, more than the bound {bound:e}"
-        );
-        for _ in 0..HALVINGS {
-            let middle = (least * greatest).sqrt();
-            if self.worst(&features.equal_error_depths(middle))? <= bound {
-                least = middle;
-            } else {
-                greatest = middle;
-            }
-        }
-        Ok(least)
+    /// What every feature's own caps are off by at depths from 1 to `deepest`, all of which were measured before.
+    pub(crate) fn by_feature(&self, blocks: &Blocks, deepest: u8) -> Vec<FeatureErrors> {
+        let topology = self.cage.topology();
+        let of_cap = |corner: u32, level: u8| {
+            let [u, v] = [[0, 0], [1, 0], [1, 1], [0, 1]][topology.corner_place(corner)];
+            let last = (1_u16 << level) - 1;
+            let place = Place {
+                face: topology.corner_face(corner),
+                u: u * last,
+                v: v * last,
+                level,
+            };
+            self.known.get(&place).copied().unwrap_or(f64::INFINITY)
+        };
+        let of_feature = |vertex: u32| FeatureErrors {
+            vertex,
+            by_depth: (1..=deepest)
+                .map(|depth| {
+                    let corners = topology.vertex_corners(vertex).iter();
+                    corners.fold(0.0, |most, &corner| of_cap(corner, depth).max(most))
+                })
+                .collect(),
+        };
+        blocks.features().map(of_feature).collect()
     }
 
     fn of_cap(&mut self, cap: &Piece<f64>) -> Result<f64> {
@@ -103,11 +127,11 @@ impl<'a> Errors<'a> {
             v: (f64::from(cap.place.v) + v) / side,
         };
         let places: Vec<_> = inside.iter().map(on_face).collect();
-        let wanted = self.limit.positions_many(&places)?;
+        let wanted = self.limit.evaluate_many(&places)?;
         let error = inside
             .iter()
-            .zip(wanted)
-            .map(|(&uv, wanted)| distance(cap.evaluate(uv).position, wanted))
+            .zip(&wanted)
+            .map(|(&uv, wanted)| off_surface(cap.evaluate(uv).position, wanted))
             .fold(0.0, f64::max);
         self.known.insert(cap.place, error);
         Ok(error)
@@ -123,6 +147,19 @@ pub(crate) fn mean_edge_length(cage: &Cage) -> f64 {
     };
     let edges = topology.edge_count();
     (0..edges).map(length).sum::<f64>() / f64::from(edges)
+}
+
+/// From a point to the limit, along its normal where it has one: a cap's parameters run at another speed than the limit's,
+/// which moves its points along the surface and is no error.
+fn off_surface(found: [f64; 3], wanted: &LimitSample) -> f64 {
+    let along: f64 = (0..3)
+        .map(|axis| (found[axis] - wanted.position[axis]) * wanted.normal[axis])
+        .sum();
+    if wanted.normal == [0.0; 3] {
+        distance(found, wanted.position)
+    } else {
+        along.abs()
+    }
 }
 
 fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {

@@ -23,14 +23,11 @@ use drumlin_benches::{
     measure::{self, Machine, geometric_mean},
     terrain_cage::{CageCounts, cage_counts},
 };
-use drumlin_core::{
-    cage::{Cage, CageBudget, read_obj},
-    fas::Features,
-};
+use drumlin_core::cage::{Cage, CageBudget, read_obj};
 use serde::Serialize;
 
 use self::{
-    errors::{Errors, mean_edge_length},
+    errors::{Errors, blocks_at, depths_within, mean_edge_length},
     scheme::Scheme,
 };
 
@@ -72,8 +69,6 @@ struct Case {
     cage: CageCounts,
     mean_edge_length: f64,
     bound: f64,
-    /// What the depth rule was tuned to.
-    tolerance: f64,
     classic: Scheme,
     adaptive: Scheme,
 }
@@ -107,11 +102,12 @@ fn case(name: &'static str, arguments: &Arguments) -> Result<Case> {
     let cage = read(&arguments.cages.join(format!("table1_{name}.obj")))?;
     let mean_edge_length = mean_edge_length(&cage);
     let bound = arguments.bound * mean_edge_length;
-    let (features, mut errors) = (Features::of(&cage), Errors::new(&cage)?);
+    let mut errors = Errors::new(&cage)?;
     let depth = errors.classic_depth(bound)?;
-    let tolerance = errors.tolerance(&features, bound)?;
-    let same = || vec![depth; cage.positions().len()];
-    let own = || features.equal_error_depths(tolerance);
+    let vertices = cage.positions().len();
+    let same = || vec![depth; vertices];
+    let features = errors.by_feature(&blocks_at(&cage, &same())?, depth);
+    let own = || depths_within(bound, &features, vertices);
     let (same_error, own_error) = (errors.worst(&same())?, errors.worst(&own())?);
     let runs = usize::from(arguments.runs);
     Ok(Case {
@@ -119,7 +115,6 @@ fn case(name: &'static str, arguments: &Arguments) -> Result<Case> {
         cage: cage_counts(&cage),
         mean_edge_length,
         bound,
-        tolerance,
         classic: scheme::measure(&cage, &same, same_error, runs)?,
         adaptive: scheme::measure(&cage, &own, own_error, runs)?,
     })
