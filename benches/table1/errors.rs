@@ -11,13 +11,15 @@ use drumlin_core::{
     fas::{Blocks, MAX_DEPTH, Piece, Place, Positions},
 };
 
-/// Places along each side of a cap at which it is measured.
-const PLACES: u32 = 8;
+/// Limit points looked at on the way to the nearest one.
+const SEARCH_STEPS: usize = 5;
 
 /// Distances of a cage's caps from the limit.
 pub(crate) struct Errors<'a> {
     cage: &'a Cage,
     limit: LimitSurface<'a>,
+    /// Steps along each side of a cap between places at which it is measured.
+    steps: u32,
     known: HashMap<Place, f64>,
 }
 
@@ -48,11 +50,12 @@ pub(crate) fn blocks_at(cage: &Cage, depths: &[u8]) -> Result<Blocks> {
 }
 
 impl<'a> Errors<'a> {
-    /// Of a cage, all quads.
-    pub(crate) fn new(cage: &'a Cage) -> Result<Self> {
+    /// Of a cage, all quads, at places so many steps a side apart.
+    pub(crate) fn new(cage: &'a Cage, steps: u32) -> Result<Self> {
         Ok(Self {
             cage,
             limit: LimitSurface::new(cage)?,
+            steps,
             known: HashMap::new(),
         })
     }
@@ -113,26 +116,50 @@ impl<'a> Errors<'a> {
         blocks.features().map(of_feature).collect()
     }
 
+    /// From points to the limit of the face they are on: to the nearest of the limit points that some steps find from
+    /// `places`, so never less than the true distance. A cap's parameters run at another speed than the limit's, so the
+    /// limit at the same parameters alone would not do.
+    fn greatest_distance(&self, found: Vec<[f64; 3]>, mut places: Vec<cage::Place>) -> Result<f64> {
+        let mut nearest: Vec<_> = places.iter().map(|&at| (f64::INFINITY, at)).collect();
+        for _ in 0..SEARCH_STEPS {
+            let samples = self.limit.evaluate_many(&places)?;
+            for (index, sample) in samples.iter().enumerate() {
+                let away = distance(found[index], sample.position);
+                let (least, best) = nearest[index];
+                places[index] = if away < least {
+                    nearest[index] = (away, places[index]);
+                    nearer(places[index], found[index], sample)
+                } else {
+                    // A step too far: half of it.
+                    cage::Place {
+                        face: best.face,
+                        u: 0.5 * (best.u + places[index].u),
+                        v: 0.5 * (best.v + places[index].v),
+                    }
+                };
+            }
+        }
+        let nearest = nearest.into_iter().map(|(least, _)| least);
+        Ok(nearest.fold(0.0, f64::max))
+    }
+
     fn of_cap(&mut self, cap: &Piece<f64>) -> Result<f64> {
         if let Some(&error) = self.known.get(&cap.place) {
             return Ok(error);
         }
+        let steps = self.steps;
         let side = f64::from(cap.place.level).exp2();
-        let step = |index: u32| f64::from(index) / f64::from(PLACES);
-        let inside = (0..=PLACES).flat_map(|v| (0..=PLACES).map(move |u| [step(u), step(v)]));
+        let step = |index: u32| f64::from(index) / f64::from(steps);
+        let inside = (0..=steps).flat_map(|v| (0..=steps).map(move |u| [step(u), step(v)]));
         let inside: Vec<[f64; 2]> = inside.collect();
         let on_face = |[u, v]: &[f64; 2]| cage::Place {
             face: cap.place.face,
             u: (f64::from(cap.place.u) + u) / side,
             v: (f64::from(cap.place.v) + v) / side,
         };
-        let places: Vec<_> = inside.iter().map(on_face).collect();
-        let wanted = self.limit.evaluate_many(&places)?;
-        let error = inside
-            .iter()
-            .zip(&wanted)
-            .map(|(&uv, wanted)| off_surface(cap.evaluate(uv).position, wanted))
-            .fold(0.0, f64::max);
+        let places = inside.iter().map(on_face).collect();
+        let found = inside.iter().map(|&uv| cap.evaluate(uv).position).collect();
+        let error = self.greatest_distance(found, places)?;
         self.known.insert(cap.place, error);
         Ok(error)
     }
@@ -149,16 +176,21 @@ pub(crate) fn mean_edge_length(cage: &Cage) -> f64 {
     (0..edges).map(length).sum::<f64>() / f64::from(edges)
 }
 
-/// From a point to the limit, along its normal where it has one: a cap's parameters run at another speed than the limit's,
-/// which moves its points along the surface and is no error.
-fn off_surface(found: [f64; 3], wanted: &LimitSample) -> f64 {
-    let along: f64 = (0..3)
-        .map(|axis| (found[axis] - wanted.position[axis]) * wanted.normal[axis])
-        .sum();
-    if wanted.normal == [0.0; 3] {
-        distance(found, wanted.position)
-    } else {
-        along.abs()
+/// Closer by a Gauss-Newton step to the place of a face whose limit is nearest to `found`; `sample` is the limit at `place`.
+fn nearer(place: cage::Place, found: [f64; 3], sample: &LimitSample) -> cage::Place {
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let (du, dv) = (sample.du, sample.dv);
+    let off = [0, 1, 2].map(|axis| found[axis] - sample.position[axis]);
+    let (uu, uv, vv) = (dot(du, du), dot(du, dv), dot(dv, dv));
+    let determinant = uu * vv - uv * uv;
+    if determinant <= 1e-12 * uu * vv {
+        return place;
+    }
+    let (u, v) = (dot(du, off), dot(dv, off));
+    cage::Place {
+        face: place.face,
+        u: (place.u + (vv * u - uv * v) / determinant).clamp(0.0, 1.0),
+        v: (place.v + (uu * v - uv * u) / determinant).clamp(0.0, 1.0),
     }
 }
 
