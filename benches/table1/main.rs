@@ -35,7 +35,7 @@ use self::{
 const NAMES: [&str; 4] = ["hippo", "crocodile", "gorilla", "koala"];
 
 /// Steps along each side of a cap between the places that depths are chosen by.
-const STEPS: u32 = 16;
+const STEPS: u32 = 32;
 /// The share of the bound that depths are chosen within, as the error may be greater between those places.
 const SHARE: f64 = 0.97;
 /// Steps between the places at which the error that is printed is measured: other places, and more.
