@@ -12,8 +12,9 @@ const NOTES: &str = "\
   at which its own caps are, looked up in what every feature is off by at each depth; those errors depend on the cage
   alone and are measured before, outside of all times. The view-dependent rule (`fas::DepthRule`) is not used here.
 * Worst error: greatest distance of caps from the exact limit of their face, at 24 x 24 places each (depths of both
-  are chosen to be within 0.97 of the bound at 33 x 33), to the nearest limit point of five on a Gauss-Newton search; other patches are the limit itself.
-  Error and bound are in mean edge lengths.
+  are chosen to be within 0.97 of the bound at 33 x 33), to the nearest limit point of five on a
+  Gauss-Newton search: never less than the true distance there. Other patches are the limit itself. Error and bound
+  are in mean edge lengths.
 * Subdivision: choosing depths, tables from linked ones at depth 0, points in f32. Not in it: reading and linking the
   cage, the same for both, and measuring the errors, which only adaptive needs.
 * Drawing: controls gathered, positions and derivatives in f32 at 5 x 5 places of every patch, on the processor. No
