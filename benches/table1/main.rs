@@ -38,8 +38,8 @@ const NAMES: [&str; 4] = ["hippo", "crocodile", "gorilla", "koala"];
 const STEPS: u32 = 32;
 /// The share of the bound that depths are chosen within, as the error may be greater between those places.
 const SHARE: f64 = 0.97;
-/// Steps between the places at which the error that is printed is measured: other places, and more.
-const FINER_STEPS: u32 = 23;
+/// Steps between the places at which the error that is printed is measured: other places, but for the corners.
+const CHECK_STEPS: u32 = 23;
 
 /// Classic against adaptive refinement at the same worst error.
 #[derive(Parser)]
@@ -115,8 +115,8 @@ fn case(name: &'static str, arguments: &Arguments) -> Result<Case> {
     let same = || vec![depth; vertices];
     let features = errors.by_feature(&blocks_at(&cage, &same())?, depth);
     let own = || depths_within(SHARE * bound, &features, vertices);
-    let mut finer = Errors::new(&cage, FINER_STEPS)?;
-    let (same_error, own_error) = (finer.worst(&same())?, finer.worst(&own())?);
+    let mut check = Errors::new(&cage, CHECK_STEPS)?;
+    let (same_error, own_error) = (check.worst(&same())?, check.worst(&own())?);
     let runs = usize::from(arguments.runs);
     Ok(Case {
         name,
