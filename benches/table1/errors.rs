@@ -5,22 +5,41 @@
 
 use std::collections::HashMap;
 
-use anyhow::{Result, ensure};
+use anyhow::Result;
 use drumlin_core::{
-    cage::{self, Cage, LimitSurface},
-    fas::{Blocks, Features, MAX_DEPTH, Piece, Place, Positions},
+    cage::{self, Cage, LimitSample, LimitSurface},
+    fas::{Blocks, MAX_DEPTH, Piece, Place, Positions},
 };
 
-/// Places along each side of a cap at which it is measured.
-const PLACES: u32 = 8;
-/// Halvings of the interval, of logarithms, that the tolerance lies in.
-const HALVINGS: usize = 30;
+/// Limit points looked at on the way to the nearest one.
+const SEARCH_STEPS: usize = 5;
 
 /// Distances of a cage's caps from the limit.
 pub(crate) struct Errors<'a> {
     cage: &'a Cage,
     limit: LimitSurface<'a>,
+    /// Steps along each side of a cap between places at which it is measured.
+    steps: u32,
     known: HashMap<Place, f64>,
+}
+
+/// What one feature's caps are off by.
+pub(crate) struct FeatureErrors {
+    vertex: u32,
+    /// At depths from 1 on.
+    by_depth: Vec<f64>,
+}
+
+/// The least depth for each feature at which its own caps are within `bound`, its greatest where none is; one depth a
+/// vertex.
+pub(crate) fn depths_within(bound: f64, features: &[FeatureErrors], vertices: usize) -> Vec<u8> {
+    let mut depths = vec![0; vertices];
+    for feature in features {
+        let errors = &feature.by_depth;
+        let above = errors.iter().take_while(|&&error| error > bound).count();
+        depths[feature.vertex as usize] = (above + 1).min(errors.len()) as u8;
+    }
+    depths
 }
 
 /// A cage's tables at these depths, one a vertex.
@@ -31,11 +50,12 @@ pub(crate) fn blocks_at(cage: &Cage, depths: &[u8]) -> Result<Blocks> {
 }
 
 impl<'a> Errors<'a> {
-    /// Of a cage, all quads.
-    pub(crate) fn new(cage: &'a Cage) -> Result<Self> {
+    /// Of a cage, all quads, at places so many steps a side apart.
+    pub(crate) fn new(cage: &'a Cage, steps: u32) -> Result<Self> {
         Ok(Self {
             cage,
             limit: LimitSurface::new(cage)?,
+            steps,
             known: HashMap::new(),
         })
     }
@@ -62,53 +82,84 @@ impl<'a> Errors<'a> {
     /// The least depth that, given to all features, keeps the worst error within `bound`.
     pub(crate) fn classic_depth(&mut self, bound: f64) -> Result<u8> {
         for depth in 1..=MAX_DEPTH {
-            if self.worst(&vec![depth; self.cage.positions().len()])? <= bound {
+            let worst = self.worst(&vec![depth; self.cage.positions().len()])?;
+            if worst <= bound {
                 return Ok(depth);
             }
         }
         anyhow::bail!("no depth up to {MAX_DEPTH} keeps the error within {bound:e}")
     }
 
-    /// The greatest tolerance, to one part in a million or so, at which the depth rule keeps the worst error within
-    /// `bound`.
-    pub(crate) fn tolerance(&mut self, features: &Features, bound: f64) -> Result<f64> {
-        let (mut least, mut greatest) = (bound * 1e-6, bound * 1e6);
-        let at_least = self.worst(&features.equal_error_depths(least))?;
-        ensure!(
-            at_least <= bound,
-            "the rule's greatest depths leave an error of {at_least:e}, more than the bound {bound:e}"
-        );
-        for _ in 0..HALVINGS {
-            let middle = (least * greatest).sqrt();
-            if self.worst(&features.equal_error_depths(middle))? <= bound {
-                least = middle;
-            } else {
-                greatest = middle;
+    /// What every feature's own caps are off by at depths from 1 to `deepest`, all of which were measured before.
+    pub(crate) fn by_feature(&self, blocks: &Blocks, deepest: u8) -> Vec<FeatureErrors> {
+        let topology = self.cage.topology();
+        let of_cap = |corner: u32, level: u8| {
+            let [u, v] = [[0, 0], [1, 0], [1, 1], [0, 1]][topology.corner_place(corner)];
+            let last = (1_u16 << level) - 1;
+            let place = Place {
+                face: topology.corner_face(corner),
+                u: u * last,
+                v: v * last,
+                level,
+            };
+            self.known.get(&place).copied().unwrap_or(f64::INFINITY)
+        };
+        let of_feature = |vertex: u32| FeatureErrors {
+            vertex,
+            by_depth: (1..=deepest)
+                .map(|depth| {
+                    let corners = topology.vertex_corners(vertex).iter();
+                    corners.fold(0.0, |most, &corner| of_cap(corner, depth).max(most))
+                })
+                .collect(),
+        };
+        blocks.features().map(of_feature).collect()
+    }
+
+    /// From points to the limit of the face they are on: to the nearest of the limit points that some steps find from
+    /// `places`, so never less than the true distance. A cap's parameters run at another speed than the limit's, so the
+    /// limit at the same parameters alone would not do.
+    fn greatest_distance(&self, found: Vec<[f64; 3]>, mut places: Vec<cage::Place>) -> Result<f64> {
+        let mut nearest: Vec<_> = places.iter().map(|&at| (f64::INFINITY, at)).collect();
+        for _ in 0..SEARCH_STEPS {
+            let samples = self.limit.evaluate_many(&places)?;
+            for (index, sample) in samples.iter().enumerate() {
+                let away = distance(found[index], sample.position);
+                let (least, best) = nearest[index];
+                places[index] = if away < least {
+                    nearest[index] = (away, places[index]);
+                    nearer(places[index], found[index], sample)
+                } else {
+                    // A step too far: half of it.
+                    cage::Place {
+                        face: best.face,
+                        u: 0.5 * (best.u + places[index].u),
+                        v: 0.5 * (best.v + places[index].v),
+                    }
+                };
             }
         }
-        Ok(least)
+        let nearest = nearest.into_iter().map(|(least, _)| least);
+        Ok(nearest.fold(0.0, f64::max))
     }
 
     fn of_cap(&mut self, cap: &Piece<f64>) -> Result<f64> {
         if let Some(&error) = self.known.get(&cap.place) {
             return Ok(error);
         }
+        let steps = self.steps;
         let side = f64::from(cap.place.level).exp2();
-        let step = |index: u32| f64::from(index) / f64::from(PLACES);
-        let inside = (0..=PLACES).flat_map(|v| (0..=PLACES).map(move |u| [step(u), step(v)]));
+        let step = |index: u32| f64::from(index) / f64::from(steps);
+        let inside = (0..=steps).flat_map(|v| (0..=steps).map(move |u| [step(u), step(v)]));
         let inside: Vec<[f64; 2]> = inside.collect();
         let on_face = |[u, v]: &[f64; 2]| cage::Place {
             face: cap.place.face,
             u: (f64::from(cap.place.u) + u) / side,
             v: (f64::from(cap.place.v) + v) / side,
         };
-        let places: Vec<_> = inside.iter().map(on_face).collect();
-        let wanted = self.limit.positions_many(&places)?;
-        let error = inside
-            .iter()
-            .zip(wanted)
-            .map(|(&uv, wanted)| distance(cap.evaluate(uv).position, wanted))
-            .fold(0.0, f64::max);
+        let places = inside.iter().map(on_face).collect();
+        let found = inside.iter().map(|&uv| cap.evaluate(uv).position).collect();
+        let error = self.greatest_distance(found, places)?;
         self.known.insert(cap.place, error);
         Ok(error)
     }
@@ -123,6 +174,24 @@ pub(crate) fn mean_edge_length(cage: &Cage) -> f64 {
     };
     let edges = topology.edge_count();
     (0..edges).map(length).sum::<f64>() / f64::from(edges)
+}
+
+/// Closer by a Gauss-Newton step to the place of a face whose limit is nearest to `found`; `sample` is the limit at `place`.
+fn nearer(place: cage::Place, found: [f64; 3], sample: &LimitSample) -> cage::Place {
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let (du, dv) = (sample.du, sample.dv);
+    let off = [0, 1, 2].map(|axis| found[axis] - sample.position[axis]);
+    let (uu, uv, vv) = (dot(du, du), dot(du, dv), dot(dv, dv));
+    let determinant = uu * vv - uv * uv;
+    if determinant <= 1e-12 * uu * vv {
+        return place;
+    }
+    let (u, v) = (dot(du, off), dot(dv, off));
+    cage::Place {
+        face: place.face,
+        u: (place.u + (vv * u - uv * v) / determinant).clamp(0.0, 1.0),
+        v: (place.v + (uu * v - uv * u) / determinant).clamp(0.0, 1.0),
+    }
 }
 
 fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {

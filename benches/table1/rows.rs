@@ -8,12 +8,15 @@ use crate::{Case, Report, scheme::Scheme};
 
 /// What is timed and what is not.
 const NOTES: &str = "\
-* Classic gives all features the least depth whose worst error is within the bound. Adaptive gives each its own by the
-  depth rule of equal error (`Features::equal_error_depths`), its tolerance tuned to the greatest that keeps the bound.
-* Worst error: greatest distance of caps from the exact limit at 9 x 9 places each; other patches are the limit itself.
-  Error and bound are in mean edge lengths.
+* Classic gives all features the least depth whose worst error is within the bound. Adaptive gives each the least depth
+  at which its own caps are, looked up in what every feature is off by at each depth; those errors depend on the cage
+  alone and are measured before, outside of all times. The view-dependent rule (`fas::DepthRule`) is not used here.
+* Worst error: greatest distance of caps from the exact limit of their face, at 24 x 24 places each (depths of both
+  are chosen to be within 0.97 of the bound at 33 x 33), to the nearest limit point of five on a
+  Gauss-Newton search: never less than the true distance there. Other patches are the limit itself. Error and bound
+  are in mean edge lengths.
 * Subdivision: choosing depths, tables from linked ones at depth 0, points in f32. Not in it: reading and linking the
-  cage, the same for both, tuning the tolerance, and measuring what depth rules depend on (`Features::of`).
+  cage, the same for both, and measuring the errors, which only adaptive needs.
 * Drawing: controls gathered, positions and derivatives in f32 at 5 x 5 places of every patch, on the processor. No
   triangles are put together and no pixels filled.
 * Feature patches: those of levels from 2 on, and caps.
