@@ -1,6 +1,8 @@
 //! `cargo verify`: everything that must hold. Warnings are errors, and a missing GPU is one too.
 
-use anyhow::{Result, bail, ensure};
+use std::{env, fs, path::PathBuf};
+
+use anyhow::{Context, Result, bail, ensure};
 
 use crate::{
     setup,
@@ -29,8 +31,38 @@ pub(crate) fn all() -> Result<()> {
     )?;
     let packages =
         "package --package drumlin-shaders --package drumlin-core --package drumlin --allow-dirty";
+    forget_packages()?;
     run("packages", &mut cargo(packages))?;
     println!("{tally}");
+    Ok(())
+}
+
+/// Removes what an earlier run unpacked: Cargo keeps one copy of a package of this workspace for each version and would
+/// build the next package against that old copy.
+fn forget_packages() -> Result<()> {
+    let home = env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| Some(env::home_dir()?.join(".cargo")));
+    let unpacked = home
+        .context("there is neither CARGO_HOME nor a home folder")?
+        .join("registry/src");
+    let Ok(registries) = fs::read_dir(&unpacked) else {
+        return Ok(());
+    };
+    for registry in registries {
+        let registry = registry?;
+        // A registry on this disk has no host, and its folder's name nothing before the dash.
+        if !registry.file_name().to_string_lossy().starts_with('-') {
+            continue;
+        }
+        for name in ["drumlin-shaders", "drumlin-core", "drumlin"] {
+            let old = registry
+                .path()
+                .join(format!("{name}-{}", env!("CARGO_PKG_VERSION")));
+            if old.exists() {
+                fs::remove_dir_all(&old).with_context(|| old.display().to_string())?;
+            }
+        }
+    }
     Ok(())
 }
 
