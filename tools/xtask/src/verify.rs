@@ -1,6 +1,9 @@
 //! `cargo verify`: everything that must hold. Warnings are errors, and a missing GPU is one too.
 
-use std::{env, fs, path::PathBuf};
+use std::{
+    env, fs,
+    path::{Path, PathBuf},
+};
 
 use anyhow::{Context, Result, bail, ensure};
 
@@ -9,6 +12,9 @@ use crate::{
     step::{cargo, run, watch},
     tally::Tally,
 };
+
+/// Where packages are compiled, apart from everything else.
+const PACKAGES: &str = "target/packages";
 
 /// Format, clippy, programs, set-up, tests, docs, packages; stops at the first step that fails.
 pub(crate) fn all() -> Result<()> {
@@ -32,38 +38,34 @@ pub(crate) fn all() -> Result<()> {
     let packages =
         "package --package drumlin-shaders --package drumlin-core --package drumlin --allow-dirty";
     forget_packages()?;
-    run("packages", &mut cargo(packages))?;
+    run("packages", cargo(packages).args(["--target-dir", PACKAGES]))?;
     println!("{tally}");
     Ok(())
 }
 
-/// Removes what an earlier run unpacked: Cargo keeps one copy of a package of this workspace for each version and would
-/// build the next package against that old copy.
+/// Removes what an earlier run unpacked and compiled: Cargo takes a package of one version for unchangeable and would build
+/// the next package against the old one.
 fn forget_packages() -> Result<()> {
     let home = env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.or_else(|| Some(env::home_dir()?.join(".cargo")));
-    let unpacked = home
-        .context("there is neither CARGO_HOME nor a home folder")?
-        .join("registry/src");
-    let Ok(registries) = fs::read_dir(&unpacked) else {
-        return Ok(());
-    };
-    for registry in registries {
-        let registry = registry?;
-        // A registry on this disk has no host, and its folder's name nothing before the dash.
-        if !registry.file_name().to_string_lossy().starts_with('-') {
-            continue;
-        }
-        for name in ["drumlin-shaders", "drumlin-core", "drumlin"] {
-            let old = registry
-                .path()
-                .join(format!("{name}-{}", env!("CARGO_PKG_VERSION")));
-            if old.exists() {
-                fs::remove_dir_all(&old).with_context(|| old.display().to_string())?;
-            }
-        }
+    let home = home.context("there is neither CARGO_HOME nor a home folder")?;
+    // A registry on this disk has no host, and its folder's name nothing before the dash.
+    for registry in names(&home.join("registry/src"), "-") {
+        names(&registry, "drumlin").try_for_each(remove)?;
     }
-    Ok(())
+    names(&Path::new(PACKAGES).join("debug/.fingerprint"), "drumlin").try_for_each(remove)
+}
+
+/// What lies in a folder, if it is there, under names that begin so.
+fn names(folder: &Path, start: &'static str) -> impl Iterator<Item = PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    entries
+        .filter(move |entry| entry.file_name().to_string_lossy().starts_with(start))
+        .map(|entry| entry.path())
+}
+
+fn remove(folder: PathBuf) -> Result<()> {
+    fs::remove_dir_all(&folder).with_context(|| folder.display().to_string())
 }
 
 /// Every test of the workspace, documentation included, on a GPU that keeps to the letter of WebGPU.
