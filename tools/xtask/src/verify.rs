@@ -9,12 +9,9 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::{
     setup,
-    step::{cargo, run, watch},
+    step::{cargo, run, target, watch},
     tally::Tally,
 };
-
-/// Where packages are compiled, apart from everything else.
-const PACKAGES: &str = "target/packages";
 
 /// Format, clippy, programs, set-up, tests, docs, packages; stops at the first step that fails.
 pub(crate) fn all() -> Result<()> {
@@ -37,15 +34,17 @@ pub(crate) fn all() -> Result<()> {
     )?;
     let packages =
         "package --package drumlin-shaders --package drumlin-core --package drumlin --allow-dirty";
-    forget_packages()?;
-    run("packages", cargo(packages).args(["--target-dir", PACKAGES]))?;
+    // Apart from everything else, for what is compiled there is forgotten every time.
+    let folder = target().join("packages");
+    forget_packages(&folder)?;
+    run("packages", cargo(packages).arg("--target-dir").arg(folder))?;
     println!("{tally}");
     Ok(())
 }
 
 /// Removes what an earlier run unpacked and compiled: Cargo takes a package of one version for unchangeable and would build
 /// the next package against the old one.
-fn forget_packages() -> Result<()> {
+fn forget_packages(compiled: &Path) -> Result<()> {
     let home = env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.or_else(|| Some(env::home_dir()?.join(".cargo")));
     let home = home.context("there is neither CARGO_HOME nor a home folder")?;
@@ -53,7 +52,7 @@ fn forget_packages() -> Result<()> {
     for registry in names(&home.join("registry/src"), "-") {
         names(&registry, "drumlin").try_for_each(remove)?;
     }
-    names(&Path::new(PACKAGES).join("debug/.fingerprint"), "drumlin").try_for_each(remove)
+    names(&compiled.join("debug/.fingerprint"), "drumlin").try_for_each(remove)
 }
 
 /// What lies in a folder, if it is there, under names that begin so.
@@ -69,7 +68,7 @@ fn remove(folder: PathBuf) -> Result<()> {
 }
 
 /// Every test of the workspace, documentation included, on a GPU that keeps to the letter of WebGPU.
-fn tests(python: &std::path::Path) -> Result<Tally> {
+fn tests(python: &Path) -> Result<Tally> {
     let mut tests = cargo("test --workspace --no-fail-fast");
     tests
         .env("REQUIRE_GPU", "1")
