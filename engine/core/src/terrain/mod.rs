@@ -19,6 +19,7 @@ mod raycast;
 mod source;
 mod stats;
 mod surface;
+mod tile_surface;
 mod update;
 
 pub use descriptor::PlannerDescriptor;
@@ -28,5 +29,6 @@ pub use pool::PoolSizes;
 pub use raycast::Hit;
 pub use source::PyramidSource;
 pub use stats::FrameStats;
-pub use surface::{Collider, Surface};
+pub use surface::Surface;
+pub use tile_surface::Collider;
 pub use update::{Planned, Updater};

@@ -8,7 +8,10 @@
 
 use std::collections::BTreeMap;
 
-use super::surface::{BLOCK_CELLS, BLOCKS, Kept, Surface, TileFrame};
+use super::{
+    surface::Surface,
+    tile_surface::{BLOCK_CELLS, BLOCKS, TileFrame, TileSurface},
+};
 use crate::{
     geo::{TILE_CELLS, TileId},
     pyramid::{PyramidError, Summary, feature::FeatureGroup},
@@ -157,7 +160,7 @@ fn box_over(
     }
 }
 
-fn over_tile(kept: &Kept, frame: &TileFrame, ray: &Ray) -> Option<Hit> {
+fn over_tile(kept: &TileSurface, frame: &TileFrame, ray: &Ray) -> Option<Hit> {
     let blocks = &kept.heights().blocks;
     let place = |block: usize| [block / BLOCKS * BLOCK_CELLS, block % BLOCKS * BLOCK_CELLS];
     let met = (0..blocks.len()).filter_map(|block| {
@@ -170,7 +173,12 @@ fn over_tile(kept: &Kept, frame: &TileFrame, ray: &Ray) -> Option<Hit> {
         .find_map(|(_, place, part)| over_block(kept, frame, *place, part))
 }
 
-fn over_block(kept: &Kept, frame: &TileFrame, [row, column]: [usize; 2], ray: &Ray) -> Option<Hit> {
+fn over_block(
+    kept: &TileSurface,
+    frame: &TileFrame,
+    [row, column]: [usize; 2],
+    ray: &Ray,
+) -> Option<Hit> {
     let ends = [row, column].map(|at| at + BLOCK_CELLS);
     let (rows, columns) = (
         row..ends[0].min(frame.cells[0]),
@@ -190,7 +198,7 @@ fn over_block(kept: &Kept, frame: &TileFrame, [row, column]: [usize; 2], ray: &R
 }
 
 /// The ray's way over a cell, cut in two where it crosses the diagonal.
-fn over_cell(kept: &Kept, frame: &TileFrame, cell: [usize; 2], ray: &Ray) -> Option<Hit> {
+fn over_cell(kept: &TileSurface, frame: &TileFrame, cell: [usize; 2], ray: &Ray) -> Option<Hit> {
     let [row, column] = cell;
     let in_cell = |t: f64| {
         let [x, y, _] = ray.at(t);
@@ -230,7 +238,7 @@ fn over_cell(kept: &Kept, frame: &TileFrame, cell: [usize; 2], ray: &Ray) -> Opt
 }
 
 fn over_triangle(
-    kept: &Kept,
+    kept: &TileSurface,
     frame: &TileFrame,
     [row, column]: [usize; 2],
     lower: bool,
