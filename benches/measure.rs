@@ -8,11 +8,11 @@ use std::{
     fs,
     path::Path,
     process::Command,
-    sync::LazyLock,
     time::{Duration, Instant},
 };
 
 use anyhow::{Context as _, Result};
+use cpu_time::ThreadTime;
 use serde::Serialize;
 
 /// Seconds of several runs of one thing.
@@ -62,46 +62,30 @@ impl Timing {
 /// Times `work` a number of times, at least once, after one run that is not counted; also what the last run gave.
 /// What a run gives is dropped outside of its time.
 pub fn median_of<T>(runs: usize, work: impl FnMut() -> T) -> (Timing, T) {
-    repeat(runs, work, wall_clock)
+    repeat(runs, work, Instant::now, |start| start.elapsed())
 }
 
 /// [`median_of`] in seconds of this thread's processor, for work that it does alone: what else the machine does
 /// meanwhile does not count. On an idle machine the same as [`median_of`].
 pub fn thread_median_of<T>(runs: usize, work: impl FnMut() -> T) -> (Timing, T) {
-    repeat(runs, work, thread_clock)
+    repeat(runs, work, ThreadTime::now, ThreadTime::elapsed)
 }
 
-fn repeat<T>(runs: usize, mut work: impl FnMut() -> T, clock: fn() -> Duration) -> (Timing, T) {
+fn repeat<T, Clock>(
+    runs: usize,
+    mut work: impl FnMut() -> T,
+    now: fn() -> Clock,
+    since: fn(&Clock) -> Duration,
+) -> (Timing, T) {
     let mut last = work();
     let mut seconds = Vec::with_capacity(runs.max(1));
     for _ in 0..runs.max(1) {
-        let start = clock();
+        let start = now();
         let result = std::hint::black_box(work());
-        seconds.push((clock().saturating_sub(start)).as_secs_f64());
+        seconds.push(since(&start).as_secs_f64());
         last = result;
     }
     (Timing::of(seconds), last)
-}
-
-fn wall_clock() -> Duration {
-    static START: LazyLock<Instant> = LazyLock::new(Instant::now);
-    START.elapsed()
-}
-
-#[cfg(target_os = "linux")]
-fn thread_clock() -> Duration {
-    let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    // The clock starts at zero with the thread.
-    Duration::new(
-        u64::try_from(now.tv_sec).unwrap_or(0),
-        u32::try_from(now.tv_nsec).unwrap_or(0),
-    )
-}
-
-/// Where there is no such clock, seconds on the wall.
-#[cfg(not(target_os = "linux"))]
-fn thread_clock() -> Duration {
-    wall_clock()
 }
 
 /// Runs `work` with a rayon pool of so many threads.
@@ -288,7 +272,7 @@ mod tests {
         let (wall, ()) = median_of(1, || std::thread::sleep(nap));
         let (thread, ()) = thread_median_of(1, || std::thread::sleep(nap));
         assert!(wall.least >= nap.as_secs_f64());
-        assert!(cfg!(not(target_os = "linux")) || thread.median < wall.median);
+        assert!(thread.median < wall.median);
     }
 
     #[test]

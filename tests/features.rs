@@ -2,9 +2,7 @@
 
 use std::{ffi::OsString, sync::Arc};
 
-use drumlin::{
-    Headless, Look, Offscreen, Pace, Terrain, TerrainDescriptor, TerrainSource, View, wgpu,
-};
+use drumlin::{Headless, Look, Pace, Terrain, TerrainDescriptor, TerrainSource, View};
 use drumlin_tests::scene::HillSource;
 
 use crate::{
@@ -30,24 +28,14 @@ pub(crate) fn terrain(gpu: &Headless) -> Terrain {
 
 /// Metres along the view axis for every pixel; features drawn.
 fn draw(gpu: &Headless, terrain: &mut Terrain, name: &str, view: &View) -> (usize, Vec<f32>) {
-    let target = Offscreen::new(&gpu.device, SIZE);
-    let report = terrain.update(view);
-    assert!(report.errors.is_empty(), "{:?}", report.errors);
-    let mut encoder = gpu
-        .device
-        .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    terrain.prepare(&gpu.device, &gpu.queue, &mut encoder);
-    terrain.draw(&mut target.color_pass(&mut encoder, [1.0, 0.0, 1.0, 1.0], None));
-    terrain.draw_distances(&mut target.distance_pass(&mut encoder));
-    gpu.queue.submit([encoder.finish()]);
+    let (report, target) = picture::frame(gpu, terrain, view, |terrain, target, encoder| {
+        terrain.draw(&mut target.color_pass(encoder, [1.0, 0.0, 1.0, 1.0], None));
+        terrain.draw_distances(&mut target.distance_pass(encoder));
+    });
     let distances = target
         .read_distance(&gpu.device, &gpu.queue)
         .expect("distances");
-    let color = target
-        .read_color(&gpu.device, &gpu.queue)
-        .expect("a picture");
-    gpu.finish().expect("no complaint");
-    picture::keep(name, SIZE, &color);
+    picture::color(gpu, &target, name);
     (report.stats.features_drawn, distances)
 }
 

@@ -53,7 +53,7 @@ pub(crate) fn binary(name: &str) -> PathBuf {
     let path = folder.join(format!("{name}{}", env::consts::EXE_SUFFIX));
     assert!(
         path.exists(),
-        "{} is missing: run `cargo build --workspace --examples` first",
+        "{} is missing: run `cargo build --workspace --bins --examples` first",
         path.display()
     );
     path

@@ -206,7 +206,10 @@ pub(super) fn bernstein_derivative(t: f64) -> [f64; 4] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Tables, testing::cage};
+    use super::super::{
+        Tables,
+        testing::{CAGES, cage},
+    };
 
     /// Face, (u, v), kind, level and position of a reference sample.
     type Row = (u32, [f64; 2], String, i32, [f64; 3]);
@@ -230,17 +233,6 @@ mod tests {
         });
         rows.collect()
     }
-
-    const CAGES: [&str; 8] = [
-        "box_creases",
-        "discs_3_5_7_10",
-        "sheet_boundary",
-        "polycube_a",
-        "terrain_a",
-        "regression_car",
-        "regression_helmet",
-        "regression_gregory_test1",
-    ];
 
     #[test]
     fn isolated_patches_are_exact_and_caps_end_in_the_limit() {

@@ -4,6 +4,27 @@ use std::{fs, path::PathBuf};
 
 use crate::cage::{Cage, CageBudget, Crease, Faces, Tags, read_obj};
 
+/// Cages of the shared reference with exact samples: valences 3 to 12, boundaries, corners, creases semi-sharp and
+/// infinite.
+pub(super) const CAGES: [&str; 8] = [
+    "box_creases",
+    "discs_3_5_7_10",
+    "sheet_boundary",
+    "polycube_a",
+    "terrain_a",
+    "regression_car",
+    "regression_helmet",
+    "regression_gregory_test1",
+];
+
+/// Closed cages of the shared reference without tags, with the counts of the paper's Table 1.
+pub(super) const TABLE1: [&str; 4] = [
+    "table1/table1_crocodile",
+    "table1/table1_gorilla",
+    "table1/table1_hippo",
+    "table1/table1_koala",
+];
+
 /// A file of the shared reference; says that it was skipped where there is none.
 pub(super) fn reference(name: &str) -> Option<PathBuf> {
     let folder =

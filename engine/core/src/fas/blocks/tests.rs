@@ -3,25 +3,13 @@
 use std::collections::HashMap;
 
 use super::{
-    super::{Patch, Place, testing::cage},
+    super::{
+        Patch, Place,
+        testing::{CAGES, TABLE1, cage},
+    },
     *,
 };
 use crate::cage::{Cage, Topology};
-
-const CAGES: [&str; 12] = [
-    "box_creases",
-    "discs_3_5_7_10",
-    "sheet_boundary",
-    "polycube_a",
-    "terrain_a",
-    "regression_car",
-    "regression_helmet",
-    "regression_gregory_test1",
-    "table1/table1_crocodile",
-    "table1/table1_gorilla",
-    "table1/table1_hippo",
-    "table1/table1_koala",
-];
 
 /// Depths from `least` to `most` that look random.
 fn scattered(count: usize, seed: u32, [least, most]: [u8; 2]) -> Vec<u8> {
@@ -117,7 +105,7 @@ fn largest(cage: &Cage) -> f64 {
 
 #[test]
 fn patches_are_those_of_the_general_tables_at_one_depth() {
-    for name in CAGES {
+    for name in CAGES.into_iter().chain(TABLE1) {
         let Some(cage) = cage(name) else { return };
         for depth in 0..=6 {
             let depths = vec![depth; cage.topology().vertex_count() as usize];
@@ -134,7 +122,7 @@ fn patches_are_those_of_the_general_tables_at_one_depth() {
 
 #[test]
 fn patches_are_those_of_the_general_tables_at_any_depths() {
-    for name in CAGES {
+    for name in CAGES.into_iter().chain(TABLE1) {
         let Some(cage) = cage(name) else { return };
         for seed in 0..4 {
             let depths = depths_of(cage.topology(), seed, [0, 5]);
@@ -151,7 +139,7 @@ fn patches_are_those_of_the_general_tables_at_any_depths() {
 
 #[test]
 fn patches_follow_the_papers_formula() {
-    for name in CAGES.iter().filter(|name| name.starts_with("table1")) {
+    for name in TABLE1 {
         let Some(cage) = cage(name) else { return };
         let topology = cage.topology();
         let depths = depths_of(topology, 7, [1, 6]);

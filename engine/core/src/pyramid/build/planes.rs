@@ -87,12 +87,7 @@ impl ControlPlane {
 
     /// The controls of an area of the plane, row by row.
     pub(super) fn read(&self, area: &Area) -> Result<Vec<i32>, PyramidError> {
-        Ok(self
-            .0
-            .read(area)?
-            .into_iter()
-            .map(|[control]| control)
-            .collect())
+        Ok(self.0.read(area)?.into_flattened())
     }
 
     /// Writes the part of some controls, those of `within`, that lies in an area.
