@@ -70,6 +70,9 @@ pub struct RasterHeader {
     pub integer: bool,
     /// False when the file says nothing of where it lies and the grid starts at (0, 0).
     pub georeferenced: bool,
+    /// How stored numbers become heights, in one line: of two openings of a file that say the same, all heights are
+    /// equal. It holds what the caller said of scale and void.
+    pub reading: String,
     /// The first source; a mosaic's is the last one given.
     pub source: SourceInfo,
 }

@@ -45,6 +45,7 @@ impl Parts {
             crs: self.crs,
             integer: self.whole && self.scaling.is_whole(),
             georeferenced: self.placement.is_some(),
+            reading: self.scaling.label(),
             source: bytes.source(),
         };
         Ok((header, flip))

@@ -44,6 +44,10 @@ impl Mosaic {
             crs: first.crs.clone(),
             integer: headers().all(|header| header.integer),
             georeferenced: first.georeferenced,
+            reading: headers()
+                .map(|header| header.reading.as_str())
+                .collect::<Vec<_>>()
+                .join(", "),
             source: SourceInfo {
                 name: name(&rasters),
                 bytes: headers().map(|header| header.source.bytes).sum(),

@@ -74,6 +74,17 @@ impl Scaling {
         }
     }
 
+    /// All of it in one line.
+    pub(super) fn label(&self) -> String {
+        let Self {
+            nodata,
+            scale,
+            divisor,
+            offset,
+        } = self;
+        format!("{scale} / {divisor} + {offset}, void {nodata:?}")
+    }
+
     /// True when whole stored numbers become whole metres.
     pub(super) fn is_whole(&self) -> bool {
         self.divisor == 1.0 && self.scale.fract() == 0.0 && self.offset.fract() == 0.0

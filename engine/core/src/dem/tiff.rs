@@ -52,6 +52,7 @@ impl Tiff {
             crs: georef.crs,
             integer: coding.is_whole() && scaling.is_whole(),
             georeferenced: georef.placement.is_some(),
+            reading: scaling.label(),
             source: bytes.source(),
         };
         let mask = Mask::find(&bytes, &ifd, &table)?;

@@ -2,7 +2,7 @@
 
 use std::{
     fs::{self, File},
-    io::Write,
+    io::{ErrorKind, Write},
     path::{Path, PathBuf},
 };
 
@@ -54,6 +54,14 @@ pub(super) fn write_whole_with(
     sync_folder(folder)
 }
 
+/// Removes a folder and all in it, where there is one.
+pub(super) fn remove_folder(path: &Path) -> Result<(), PyramidError> {
+    match fs::remove_dir_all(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+        other => other.map_err(PyramidError::io("removing", path)),
+    }
+}
+
 /// Brings a folder's names to the disk.
 #[cfg(unix)]
 pub(super) fn sync_folder(folder: &Path) -> Result<(), PyramidError> {
@@ -95,7 +103,7 @@ pub(super) fn read_exact_at(
     while !buffer.is_empty() {
         let count = std::os::windows::fs::FileExt::seek_read(file, buffer, offset)?;
         if count == 0 {
-            return Err(std::io::ErrorKind::UnexpectedEof.into());
+            return Err(ErrorKind::UnexpectedEof.into());
         }
         buffer = &mut buffer[count..];
         offset += count as u64;
@@ -108,6 +116,9 @@ pub(super) fn read_exact_at(
 pub(super) fn write_all_at(file: &File, mut bytes: &[u8], mut offset: u64) -> std::io::Result<()> {
     while !bytes.is_empty() {
         let count = std::os::windows::fs::FileExt::seek_write(file, bytes, offset)?;
+        if count == 0 {
+            return Err(ErrorKind::WriteZero.into());
+        }
         bytes = &bytes[count..];
         offset += count as u64;
     }

@@ -69,6 +69,7 @@ impl Area {
 
     /// Row and column, counted from this area's first, of another's first place, which lies in it.
     pub(super) fn offset_of(&self, other: &Self) -> [usize; 2] {
+        debug_assert!(self.contains(other), "{other:?} in {self:?}");
         [
             other.rows.start - self.rows.start,
             other.columns.start - self.columns.start,

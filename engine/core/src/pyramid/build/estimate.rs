@@ -7,9 +7,10 @@ use serde::Serialize;
 
 use super::area::Blocks;
 use super::border::plane_size;
+use super::levels::{fit_blocks, tile_count};
 use super::options::{BuildOptions, Imagery, Stage};
 use super::plan::Shape;
-use super::{Plan, build, errors, levels::tile_count, read};
+use super::{Plan, build, errors, read};
 use crate::dem::{DemError, Raster, RasterHeader, Window};
 use crate::geo::{Grid, TILE_CELLS};
 use crate::pyramid::files::sibling;
@@ -95,7 +96,6 @@ pub fn plan(
 fn passes(raster: &dyn Raster, grid: &Grid, shape: &Shape) -> Vec<PassPlan> {
     let side = shape.block_side();
     let finest = grid.level_count() - 1;
-    let blocks = |level: u8, side: usize| Blocks::new(plane_size(grid, level), side).count() as u64;
     let settled = |level: u8| {
         let size = grid
             .tiles(level)
@@ -120,7 +120,9 @@ fn passes(raster: &dyn Raster, grid: &Grid, shape: &Shape) -> Vec<PassPlan> {
         pass(
             Stage::Fit,
             0..finest,
-            (0..finest).map(|level| blocks(level, side / 2)).sum(),
+            (0..finest)
+                .map(|level| fit_blocks(grid, level, side).count() as u64)
+                .sum(),
         ),
         pass(
             Stage::Encode,

@@ -73,7 +73,9 @@ impl<'a> StoredGround<'a> {
 impl Ground for StoredGround<'_> {
     fn control(&self, row: i64, column: i64) -> i32 {
         let place = [row, column].map(|at| usize::try_from(at + 1).unwrap_or(0));
-        let found = self.kept_controls.at(place, |area| self.cage.read(area));
+        let found = self
+            .kept_controls
+            .at(place, |area| self.cage.controls(area));
         self.answer(found, |block, index| block[index])
     }
 

@@ -16,7 +16,7 @@ use super::quantise::{Cage, is_key, key_width, quantise};
 use super::read::read_finest;
 use super::samples::Samples;
 use super::scale::Scale;
-use super::voids;
+use super::voids::Gaps;
 use crate::dem::Raster;
 use crate::geo::{Grid, QUAD_SAMPLES, TILE_CELLS, TILE_QUADS};
 use crate::pyramid::surface::{decode_heights, encode_detail};
@@ -48,8 +48,7 @@ impl Levels {
             scratch,
             side: shape.block_side(),
         };
-        let mut void_count = 0;
-        let finest = rise.finest(raster, scale, shape, watch, &mut void_count)?;
+        let (finest, void_count) = rise.finest(raster, scale, shape, watch)?;
         let fitted = rise.coarser(finest, watch)?;
         let mut levels = Self {
             levels: Vec::new(),
@@ -125,15 +124,14 @@ impl Rise<'_> {
         SamplePlane::create(self.scratch, &format!("{what}-{level}"), size)
     }
 
-    /// The finest samples: read, filled where void, continued past the data.
+    /// The finest samples: read, filled where void, continued past the data; and how many are void.
     fn finest(
         &self,
         raster: &dyn Raster,
         scale: &Scale,
         shape: &Shape,
         watch: &Watch<'_>,
-        void_count: &mut u64,
-    ) -> Result<SamplePlane, PyramidError> {
+    ) -> Result<(SamplePlane, u64), PyramidError> {
         let grid = &self.grid;
         let level = grid.level_count() - 1;
         let plane = self.plane("fitted", level, plane_size(grid, level))?;
@@ -141,30 +139,41 @@ impl Rise<'_> {
         let total = u64::from(rows) * u64::from(columns);
         let advance = watch.stage(Stage::Read, total);
         let name = &raster.header().source.name;
-        *void_count = read_finest(raster, scale.unit(), &plane, shape.window_samples, &advance)
+        let void_count = read_finest(raster, scale.unit(), &plane, shape.window_samples, &advance)
             .map_err(|error| match error {
                 PyramidError::Unfit(what) => PyramidError::Unfit(format!("{name}: {what}")),
                 other => other,
             })?;
-        if *void_count == total {
+        if void_count == total {
             return Err(PyramidError::Unfit(format!(
                 "{name}: all {rows} x {columns} samples are void: there is no terrain"
             )));
         }
         let data = [rows, columns].map(|count| count as usize);
-        if *void_count > 0 {
-            voids::fill(&plane, data, self.scratch, self.side)?;
+        if void_count > 0 {
+            let gaps = Gaps {
+                scratch: self.scratch,
+                side: self.side,
+                watch,
+            };
+            gaps.fill(&plane, data)?;
         }
-        self.continue_finest(&plane, data)?;
-        Ok(plane)
+        self.continue_finest(&plane, data, watch)?;
+        Ok((plane, void_count))
     }
 
-    fn continue_finest(&self, plane: &SamplePlane, data: [usize; 2]) -> Result<(), PyramidError> {
+    fn continue_finest(
+        &self,
+        plane: &SamplePlane,
+        data: [usize; 2],
+        watch: &Watch<'_>,
+    ) -> Result<(), PyramidError> {
         let size = plane.size();
         let east = Area::new(0..data[0], data[1]..size[1]);
         let south = Area::new(data[0]..size[0], 0..size[1]);
         let blocks = Blocks::new(size, self.side);
         let block = |index| {
+            watch.check()?;
             for part in [&east, &south].map(|beyond| blocks.area(index).and(beyond)) {
                 if !part.is_empty() {
                     let samples = continued(&part, data, size, |area| plane.read(area))?;
@@ -183,37 +192,50 @@ impl Rise<'_> {
         watch: &Watch<'_>,
     ) -> Result<Vec<SamplePlane>, PyramidError> {
         let coarser = 0..self.grid.level_count() - 1;
-        let tiles = coarser.clone().map(|level| tile_count(&self.grid, level));
-        let advance = watch.stage(Stage::Fit, tiles.sum());
+        let blocks = coarser.clone().map(|level| {
+            let blocks = fit_blocks(&self.grid, level, self.side);
+            blocks.count() as u64
+        });
+        let advance = watch.stage(Stage::Fit, blocks.sum());
         let mut planes = vec![finest];
         for level in coarser.rev() {
             let coarse = self.plane("fitted", level, plane_size(&self.grid, level))?;
             if let Some(fine) = planes.last() {
-                self.coarsen(fine, &coarse)?;
+                let blocks = fit_blocks(&self.grid, level, self.side);
+                coarsen(fine, &coarse, blocks, &advance)?;
             }
             planes.push(coarse);
-            advance(tile_count(&self.grid, level))?;
         }
         planes.reverse();
         Ok(planes)
     }
+}
 
-    /// Fits a coarser level to a finer one.
-    fn coarsen(&self, fine: &SamplePlane, coarse: &SamplePlane) -> Result<(), PyramidError> {
-        let fitted = fine.size().map(|samples| samples / 2 + 1);
-        let blocks = Blocks::new(coarse.size(), self.side / 2);
-        let block = |index| {
-            let area = blocks.area(index);
-            let samples = continued(&area, fitted, coarse.size(), |area| {
-                let below = fine.read_mirrored(&HATS.support(area))?;
-                let mut samples = Samples::new(area.clone(), HATS.fit(area, &below));
-                below.mark_coarser_voids(&mut samples);
-                Ok(samples)
-            })?;
-            coarse.write(&area, &samples)
-        };
-        in_order(blocks.count(), block, |(), ()| ())
-    }
+/// The blocks in which a coarser level is fitted: half as wide as those of the finer level that they are fitted to.
+pub(super) fn fit_blocks(grid: &Grid, level: u8, side: usize) -> Blocks {
+    Blocks::new(plane_size(grid, level), side / 2)
+}
+
+/// Fits a coarser level to a finer one.
+fn coarsen(
+    fine: &SamplePlane,
+    coarse: &SamplePlane,
+    blocks: Blocks,
+    advance: &(dyn Fn(u64) -> Result<(), PyramidError> + Sync),
+) -> Result<(), PyramidError> {
+    let fitted = fine.size().map(|samples| samples / 2 + 1);
+    let block = |index| {
+        let area = blocks.area(index);
+        let samples = continued(&area, fitted, coarse.size(), |area| {
+            let below = fine.read_mirrored(&HATS.support(area))?;
+            let mut samples = Samples::new(area.clone(), HATS.fit(area, &below));
+            below.mark_coarser_voids(&mut samples);
+            Ok(samples)
+        })?;
+        coarse.write(&area, &samples)?;
+        advance(1)
+    };
+    in_order(blocks.count(), block, |(), ()| ())
 }
 
 /// A level on the way down.
@@ -258,7 +280,7 @@ impl Settling<'_> {
             end(own.rows.end, rows.start * TILE_QUADS, all_rows),
             end(own.columns.end, columns.start * TILE_QUADS, all_columns),
         );
-        self.cage.write(&owned, &controls, cage.controls())?;
+        self.cage.put_controls(&owned, &controls, cage.controls())?;
         Ok(widths)
     }
 
@@ -274,7 +296,7 @@ impl Settling<'_> {
                 rows: half(&controls.rows),
                 columns: half(&controls.columns),
             };
-            Ok(Cage::new(above.size()[1], plane.read(&above)?))
+            Ok(Cage::new(above.size()[1], plane.controls(&above)?))
         });
         let parent = parent.transpose()?;
         let width = quantise(cage, parent.as_ref(), self.step)?;

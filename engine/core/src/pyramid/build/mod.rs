@@ -49,14 +49,18 @@ use self::options::Watch;
 use self::plan::Shape;
 use self::records::Records;
 use self::scale::Scale;
-use super::{Metadata, PyramidError, PyramidWriter, ShardInfo};
+use super::{Metadata, PyramidError, PyramidWriter, ShardInfo, files::remove_folder};
 use crate::dem::Raster;
 use crate::geo::Grid;
 
+/// The version of the builder's arithmetic: to be raised with every change after which the same input gives other
+/// bytes, so that no build is gone on with by a builder that would have made it otherwise.
+const BUILDER: u32 = 1;
+
 /// Builds a pyramid.
 ///
-/// `progress` is called often and from any thread. When `cancel` becomes true the build stops at the next shard, strip
-/// or level; what it has written is gone on with by the next run with the same options, where sources are named.
+/// `progress` is called often and from any thread. When `cancel` becomes true the build stops at the next window, block
+/// or shard; the shards it has written are kept by the next run with the same options, where sources are named.
 ///
 /// # Errors
 /// [`PyramidError::Refused`] for options that cannot be met or an output that is something else;
@@ -91,9 +95,12 @@ pub fn build(
         }
         Err(error) => {
             let resumable = matches!(error, PyramidError::Interrupted | PyramidError::Io { .. });
-            if !resumable || plan.fingerprint.is_empty() {
-                writer.discard()?;
-            }
+            // The first error is the one to tell; what cannot be removed now, the next run removes.
+            let _ = if resumable && !plan.fingerprint.is_empty() {
+                remove_folder(&writer.scratch())
+            } else {
+                writer.discard()
+            };
             Err(error)
         }
     }
@@ -140,7 +147,7 @@ impl Plan {
     ) -> Result<(Metadata, Vec<ShardInfo>, BuildReport), PyramidError> {
         let (grid, unit) = (&self.grid, self.scale.unit());
         let scratch = writer.scratch();
-        scratch::clear(&scratch)?;
+        remove_folder(&scratch)?;
         let levels = Levels::new(raster, &self.scale, &self.shape, &scratch, watch)?;
         let features = Features::new(&options.features, &levels, raster.header(), unit)?;
         let errors = Errors::measure(&levels, grid, &scratch, watch)?;
@@ -152,6 +159,7 @@ impl Plan {
             unit,
         };
         let (mut shards, root) = records.write(writer, &scratch, watch)?;
+        remove_folder(&scratch)?;
         let height_range = errors.height_range;
         let mut report = self.report(options, &shards, f64::from(root.error));
         report.void_samples = levels.void_count;
@@ -221,12 +229,11 @@ fn fingerprint(
 ) -> String {
     let header = raster.header();
     let imagery = imagery.map(|imagery| (&imagery.sources, imagery.image.extent));
-    let version = env!("CARGO_PKG_VERSION");
     format!(
-        "{version} {:?} {:?} {:?} {:?} {imagery:?} {}",
+        "builder {BUILDER} {:?} {:?} {} {scale:?} {:?} {imagery:?} {}",
         header.grid,
         header.crs,
-        scale,
+        header.reading,
         options.sources,
         features::fingerprint(&options.features)
     )

@@ -135,6 +135,15 @@ impl<'a> Watch<'a> {
         Self { progress, cancel }
     }
 
+    /// Says where the caller wants no more.
+    pub(super) fn check(&self) -> Result<(), PyramidError> {
+        if self.cancel.load(Ordering::Relaxed) {
+            Err(PyramidError::Interrupted)
+        } else {
+            Ok(())
+        }
+    }
+
     /// Starts a stage of so many steps; the result is to be called with every few of them.
     pub(super) fn stage(
         &self,
@@ -150,11 +159,7 @@ impl<'a> Watch<'a> {
         move |steps| {
             let done = count.fetch_add(steps, Ordering::Relaxed) + steps;
             (self.progress)(Progress { stage, done, total });
-            if self.cancel.load(Ordering::Relaxed) {
-                Err(PyramidError::Interrupted)
-            } else {
-                Ok(())
-            }
+            self.check()
         }
     }
 }

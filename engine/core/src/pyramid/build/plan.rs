@@ -33,7 +33,8 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    /// The largest blocks that fit the budget on as many threads as asked for, or on fewer where they do not.
+    /// As many threads as asked for, or the most of which even the smallest blocks fit the budget; then the largest
+    /// blocks that fit on those.
     ///
     /// # Errors
     /// [`PyramidError::Refused`] where one thread with the smallest blocks takes more than the budget.
@@ -76,7 +77,7 @@ impl Shape {
     fn of(raster: &dyn Raster, fixed: u64, threads: usize, block_tiles: usize) -> Self {
         let side = block_tiles * TILE_CELLS;
         let window_samples = (side * side) as u64;
-        // The last block of a row may be a tile wider than the others less one sample.
+        // A plane's last block of a row or column takes the plane's last sample too.
         let block = ((side + 1 + 2 * HALO) as u64).pow(2) * BLOCK_SAMPLE_BYTES;
         let window = read::window_samples(raster, window_samples) * WINDOW_SAMPLE_BYTES;
         let memory_bytes = fixed + threads as u64 * (THREAD_BYTES + block.max(window));

@@ -8,9 +8,11 @@ use super::samples::Samples;
 use super::scratch::Plane;
 use crate::pyramid::PyramidError;
 
+/// Heights are under this many units, so that doubled and marked they are a number. Those that are read are under 2²⁵;
+/// fitted and continued ones may overshoot that, and are refused here.
+const HEIGHT_LIMIT: i32 = 1 << 30;
+
 /// Samples, each one number: the height in units, doubled, plus one where it is void.
-///
-/// Heights are under 2²⁶ units, so nothing is lost.
 #[derive(Debug)]
 pub(super) struct SamplePlane(Plane<1>);
 
@@ -31,15 +33,14 @@ impl SamplePlane {
 
     /// The samples of an area of the plane.
     pub(super) fn read(&self, area: &Area) -> Result<Samples, PyramidError> {
-        let packed = self.0.read(area)?;
-        let any_void = packed.iter().any(|[number]| number & 1 == 1);
-        let values = packed.iter().map(|[number]| number >> 1).collect();
-        let mut samples = Samples::new(area.clone(), values);
-        if any_void {
-            let columns = samples.columns;
-            for at in (0..packed.len()).filter(|at| packed[*at][0] & 1 == 1) {
+        let numbers = self.0.read(area)?.into_flattened();
+        let mut samples = Samples::new(area.clone(), numbers);
+        let columns = samples.columns;
+        for at in 0..samples.values.len() {
+            if samples.values[at] & 1 == 1 {
                 samples.set_void(at / columns, at % columns);
             }
+            samples.values[at] >>= 1;
         }
         Ok(samples)
     }
@@ -50,8 +51,12 @@ impl SamplePlane {
     }
 
     /// Writes the part of some samples that lies in an area.
+    ///
+    /// # Errors
+    /// [`PyramidError::Unfit`] for a height too large to be marked; what the disk says.
     pub(super) fn write(&self, area: &Area, samples: &Samples) -> Result<(), PyramidError> {
-        let mut packed: Vec<[i32; 1]> = samples.values.iter().map(|height| [height << 1]).collect();
+        let packed = samples.values.iter().map(|height| pack(*height));
+        let mut packed = packed.collect::<Result<Vec<[i32; 1]>, _>>()?;
         if samples.voids.is_some() {
             for (at, number) in packed.iter_mut().enumerate() {
                 number[0] |= i32::from(samples.is_void(at / samples.columns, at % samples.columns));
@@ -66,39 +71,33 @@ impl SamplePlane {
     }
 }
 
+fn pack(height: i32) -> Result<[i32; 1], PyramidError> {
+    if height.unsigned_abs() < HEIGHT_LIMIT.unsigned_abs() {
+        return Ok([height << 1]);
+    }
+    Err(PyramidError::Unfit(format!(
+        "a fitted height of {height} units is over the limit of 2^30; a greater error bound or unit allows it"
+    )))
+}
+
 /// The controls of a level: row and column 0 are lattice points −1.
-#[derive(Debug)]
-pub(super) struct ControlPlane(Plane<1>);
+pub(super) type ControlPlane = Plane<1>;
 
 impl ControlPlane {
-    /// A plane of so many rows and columns.
-    pub(super) fn create(
-        scratch: &Path,
-        name: &str,
-        size: [usize; 2],
-    ) -> Result<Self, PyramidError> {
-        Plane::create(scratch, name, size).map(Self)
-    }
-
-    /// Rows and columns.
-    pub(super) const fn size(&self) -> [usize; 2] {
-        self.0.size()
-    }
-
     /// The controls of an area of the plane, row by row.
-    pub(super) fn read(&self, area: &Area) -> Result<Vec<i32>, PyramidError> {
-        Ok(self.0.read(area)?.into_flattened())
+    pub(super) fn controls(&self, area: &Area) -> Result<Vec<i32>, PyramidError> {
+        Ok(self.read(area)?.into_flattened())
     }
 
     /// Writes the part of some controls, those of `within`, that lies in an area.
-    pub(super) fn write(
+    pub(super) fn put_controls(
         &self,
         area: &Area,
         within: &Area,
         controls: &[i32],
     ) -> Result<(), PyramidError> {
         let (entries, _) = controls.as_chunks::<1>();
-        self.0.write(area, within, entries)
+        self.write(area, within, entries)
     }
 }
 
@@ -121,5 +120,20 @@ mod tests {
             2 * samples.values[17] - samples.values[7]
         );
         assert!(beyond.is_void(4, 1));
+    }
+
+    #[test]
+    fn a_height_too_large_to_be_marked_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let plane = SamplePlane::create(folder.path(), "a", [1, 1]).unwrap();
+        let all = Area::whole([1, 1]);
+        let write = |height| plane.write(&all, &Samples::new(all.clone(), vec![height]));
+        for height in [HEIGHT_LIMIT - 1, 1 - HEIGHT_LIMIT] {
+            write(height).unwrap();
+            assert_eq!(plane.read(&all).unwrap().values, [height]);
+        }
+        for height in [HEIGHT_LIMIT, i32::MIN] {
+            assert!(matches!(write(height), Err(PyramidError::Unfit(_))));
+        }
     }
 }

@@ -84,7 +84,7 @@ pub(super) fn is_key(level: u8) -> bool {
 /// Returns how many bytes the widest r takes.
 ///
 /// # Errors
-/// [`PyramidError::Refused`] where a control leaves the range of the 32-bit rule.
+/// [`PyramidError::Unfit`] where a control leaves the range of the 32-bit rule.
 pub(super) fn quantise(
     cage: &mut Cage,
     parent: Option<&Cage>,

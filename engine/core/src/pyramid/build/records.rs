@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::num::NonZero;
+use std::ops::Range;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -86,10 +87,10 @@ impl Records<'_> {
         let tiles = self.grid.tiles(level);
         let groups: Vec<[u32; 2]> = groups_of(tiles, shard);
         let measure = |index: usize| {
-            let group = self.group(level, groups[index])?;
-            group
+            let ground = self.ground(level, groups[index])?;
+            ground
                 .tiles(tiles)
-                .map(|tile| self.measure(&group, tile, finer))
+                .map(|tile| self.measure(&ground, tile, finer))
                 .collect()
         };
         let join = |mut all: Vec<Measured>, mut more: Vec<Measured>| {
@@ -127,60 +128,72 @@ impl Records<'_> {
     /// A tile's group, from the last used ones or read.
     fn kept_group(
         &self,
-        kept: &Mutex<LruCache<[u32; 2], Arc<Group>>>,
+        kept: &Mutex<LruCache<[u32; 2], Slot>>,
         tile: TileId,
     ) -> Result<Arc<Group>, PyramidError> {
         let place = [tile.row, tile.column].map(|index| index / GROUP);
-        let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(group) = kept.get(&place) {
+        let slot = kept
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .get_or_insert(place, Slot::default)
+            .clone();
+        // Others wait here for this group, and not for all.
+        let mut group = slot.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(group) = &*group {
             return Ok(group.clone());
         }
-        let group = Arc::new(self.group(tile.level, place)?);
-        kept.put(place, group.clone());
-        Ok(group)
+        let read = Arc::new(self.group(tile.level, place)?);
+        *group = Some(read.clone());
+        Ok(read)
+    }
+
+    /// Rows and columns of a group's tiles.
+    fn tiles_of(&self, level: u8, place: [u32; 2]) -> [Range<usize>; 2] {
+        let tiles = self.grid.tiles(level);
+        [0, 1].map(|axis| {
+            let first = place[axis] * GROUP;
+            first as usize..(first + GROUP).min(tiles[axis]) as usize
+        })
+    }
+
+    fn ground(&self, level: u8, place: [u32; 2]) -> Result<Ground, PyramidError> {
+        let tiles = self.tiles_of(level, place);
+        let area = window(&tiles, TILE_CELLS, 1);
+        Ok(Ground {
+            level,
+            first: [tiles[0].start, tiles[1].start],
+            samples: self.levels.samples[usize::from(level)].read(&area)?,
+        })
     }
 
     fn group(&self, level: u8, place: [u32; 2]) -> Result<Group, PyramidError> {
         let index = usize::from(level);
-        let tiles = self.grid.tiles(level);
-        let ranges = [0, 1].map(|axis| {
-            let first = place[axis] * GROUP;
-            first as usize..(first + GROUP).min(tiles[axis]) as usize
-        });
-        let [rows, columns] = &ranges;
-        let window = |per_tile: usize, more: usize| {
-            let range = |tiles: &std::ops::Range<usize>| {
-                tiles.start * per_tile..tiles.end * per_tile + more
-            };
-            Area::new(range(rows), range(columns))
-        };
+        let tiles = self.tiles_of(level, place);
         let cage = |level: usize, area: &Area| -> Result<Cage, PyramidError> {
             Ok(Cage::new(
                 area.size()[1],
-                self.levels.cages[level].read(area)?,
+                self.levels.cages[level].controls(area)?,
             ))
         };
         let parent = if self.levels.levels[index].key {
             None
         } else {
             // Groups start at even tiles; of an odd number, the last parent is read whole.
-            let half = |tiles: &std::ops::Range<usize>| {
-                tiles.start / 2 * TILE_QUADS..tiles.end.div_ceil(2) * TILE_QUADS + 3
-            };
-            Some(cage(index - 1, &Area::new(half(rows), half(columns)))?)
+            let parents = tiles
+                .each_ref()
+                .map(|tiles| tiles.start / 2..tiles.end.div_ceil(2));
+            Some(cage(index - 1, &window(&parents, TILE_QUADS, 3))?)
         };
         Ok(Group {
-            level,
-            first: [rows.start, columns.start],
-            samples: self.levels.samples[index].read(&window(TILE_CELLS, 1))?,
-            cage: cage(index, &window(TILE_QUADS, 3))?,
+            ground: self.ground(level, place)?,
+            cage: cage(index, &window(&tiles, TILE_QUADS, 3))?,
             parent,
         })
     }
 
     fn measure(
         &self,
-        group: &Group,
+        ground: &Ground,
         id: TileId,
         finer: Option<&Plane<4>>,
     ) -> Result<Measured, PyramidError> {
@@ -190,8 +203,8 @@ impl Records<'_> {
         let whole = patches
             .iter()
             .fold(0.0, |worst: f64, patch| worst.max(patch.whole));
-        let heights = group.samples.tile(group.first_sample(id));
-        let (_, voids) = group.samples.tile_voids(group.first_sample(id));
+        let heights = ground.samples.tile(ground.first_sample(id));
+        let (_, voids) = ground.samples.tile_voids(ground.first_sample(id));
         let error = ceil_f32(whole * self.unit);
         let mut summary = summarise(&heights, voids, error, &children);
         self.features.add_to(&mut summary, id);
@@ -217,18 +230,24 @@ fn groups_of(tiles: [u32; 2], shard: [u32; 2]) -> Vec<[u32; 2]> {
         .collect()
 }
 
-/// Up to 4 × 4 tiles of a level, as stored.
-struct Group {
+/// What some rows and columns of tiles take up of a plane with so many entries a tile and so many more.
+fn window([rows, columns]: &[Range<usize>; 2], per_tile: usize, more: usize) -> Area {
+    let range = |tiles: &Range<usize>| tiles.start * per_tile..tiles.end * per_tile + more;
+    Area::new(range(rows), range(columns))
+}
+
+/// A group that is read, or will be by whoever holds its lock.
+type Slot = Arc<Mutex<Option<Arc<Group>>>>;
+
+/// Samples of up to 4 × 4 tiles of a level, as stored.
+struct Ground {
     level: u8,
     /// Row and column of the first tile.
     first: [usize; 2],
     samples: Samples,
-    cage: Cage,
-    /// The parents' controls; none at a key level.
-    parent: Option<Cage>,
 }
 
-impl Group {
+impl Ground {
     fn tiles(&self, tiles: [u32; 2]) -> impl Iterator<Item = TileId> {
         let first = self
             .first
@@ -253,18 +272,30 @@ impl Group {
     fn first_sample(&self, tile: TileId) -> [usize; 2] {
         self.place(tile).map(|index| index * TILE_CELLS)
     }
+}
 
+/// All that the records of up to 4 × 4 tiles hold.
+struct Group {
+    ground: Ground,
+    cage: Cage,
+    /// The parents' controls; none at a key level.
+    parent: Option<Cage>,
+}
+
+impl Group {
     /// The record of a tile.
     fn record(&self, level: &Level, layout: &RecordLayout, measured: &Measured) -> Vec<u8> {
         let id = measured.id;
-        let controls = self.cage.tile(self.place(id));
-        let heights = self.samples.tile(self.first_sample(id));
+        let Ground { samples, .. } = &self.ground;
+        let (place, first) = (self.ground.place(id), self.ground.first_sample(id));
+        let controls = self.cage.tile(place);
+        let heights = samples.tile(first);
         let detail = encode_detail(&heights, &controls, level.step);
-        let (voids, _) = self.samples.tile_voids(self.first_sample(id));
+        let (voids, _) = samples.tile_voids(first);
         let cage = match &self.parent {
             None => encode_key_controls(&controls, level.step),
             Some(parent) => {
-                let above = self.place(id).map(|index| index / 2);
+                let above = place.map(|index| index / 2);
                 let predicted = child_window(&parent.tile(above), id.quadrant());
                 controls
                     .iter()

@@ -30,6 +30,7 @@ impl Field {
                 .iter()
                 .all(|height| !height.is_finite() || height.fract() == 0.0),
             georeferenced: true,
+            reading: String::new(),
             source: SourceInfo {
                 name: "field".into(),
                 bytes: 0,

@@ -204,7 +204,13 @@ fn run(raster: &dyn Raster, options: &BuildOptions) -> Result<BuildReport, Pyram
     build(raster, None, options, &|_| (), &AtomicBool::new(false))
 }
 
-/// Every file below a folder and what is in it.
+/// Every file of a pyramid and what is in it.
+fn files_of(pyramid: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    tree(pyramid, "", &mut files);
+    files
+}
+
 fn tree(folder: &Path, below: &str, files: &mut BTreeMap<String, Vec<u8>>) {
     for entry in fs::read_dir(folder).unwrap() {
         let entry = entry.unwrap();
@@ -410,58 +416,128 @@ fn any_number_of_threads_and_any_memory_writes_the_same_bytes() {
             hills(row, column)
         }
     });
-    let budgets = [(1, 64), (1, 72), (4, 100), (4, 1000)];
-    let trees = budgets.map(|(threads, budget_mib)| {
+    // A block of every size that there is, on one thread and on several.
+    let shapes = [(4, 88, 1), (1, 58, 2), (4, 130, 4), (1, 1000, 8)];
+    let trees = shapes.map(|(threads, budget_mib, block_tiles)| {
         let options = BuildOptions {
             memory_budget: Some(budget_mib << 20),
-            ..options(
-                folder.path(),
-                &format!("out{threads}-{budget_mib}"),
-                threads,
-            )
+            ..options(folder.path(), &format!("out{block_tiles}"), threads)
         };
+        let shape = Shape::new(&field, None, &options).unwrap();
+        assert_eq!((shape.threads, shape.block_tiles), (threads, block_tiles));
         let report = run(&field, &options).unwrap();
         assert!(report.memory_bytes <= budget_mib << 20);
         assert_eq!(
             (report.samples, report.levels, report.void_samples),
             ([700, 421], 4, 17 * 421)
         );
-        let mut files = BTreeMap::new();
-        tree(&options.output, "", &mut files);
-        files
+        files_of(&options.output)
     });
     assert!(trees.iter().all(|tree| *tree == trees[0]));
     assert!(trees[0].len() > 6);
 }
 
-#[test]
-fn an_interrupted_build_is_gone_on_with_to_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    let field = Field::new(300, 421, hills);
-    let source = crate::pyramid::SourceMetadata {
-        name: "hills".into(),
-        bytes: 1,
-        blake3: "00".into(),
-    };
-    let options = |name: &str| BuildOptions {
-        sources: vec![source.clone()],
-        ..options(folder.path(), name, 2)
-    };
-    run(&field, &options("whole")).unwrap();
+/// Options with a named source: of builds that can be gone on with.
+fn resumable(folder: &Path, name: &str) -> BuildOptions {
+    BuildOptions {
+        sources: vec![crate::pyramid::SourceMetadata {
+            name: "hills".into(),
+            bytes: 1,
+            blake3: "00".into(),
+        }],
+        ..options(folder, name, 2)
+    }
+}
+
+/// Builds until the first shard is written.
+fn stop_at_first_shard(raster: &dyn Raster, options: &BuildOptions) {
     let cancel = AtomicBool::new(false);
     let stop = |progress: Progress| {
         if progress.stage == Stage::Write && progress.done == 1 {
             cancel.store(true, std::sync::atomic::Ordering::Relaxed);
         }
     };
-    let stopped = build(&field, None, &options("resumed"), &stop, &cancel);
+    let stopped = build(raster, None, options, &stop, &cancel);
     assert!(matches!(stopped, Err(PyramidError::Interrupted)));
-    assert!(!options("resumed").output.exists());
+    assert!(!options.output.exists());
+}
+
+#[test]
+fn an_interrupted_build_is_gone_on_with_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let field = Field::new(300, 421, hills);
+    let options = |name: &str| resumable(folder.path(), name);
+    run(&field, &options("whole")).unwrap();
+    stop_at_first_shard(&field, &options("resumed"));
+    let building = folder.path().join("resumed.building");
+    assert!(!building.join("scratch").exists());
+    // The one shard that is there is dated back: written again, it would be of today.
+    let journal = fs::read_to_string(building.join("manifest/journal.jsonl")).unwrap();
+    let written: ShardInfo = serde_json::from_str(journal.lines().next().unwrap()).unwrap();
+    let long_ago = std::time::SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(1_000_000);
+    let shard = fs::File::options()
+        .write(true)
+        .open(building.join(&written.key));
+    shard.unwrap().set_modified(long_ago).unwrap();
     run(&field, &options("resumed")).unwrap();
-    let [mut whole, mut resumed] = [BTreeMap::new(), BTreeMap::new()];
-    tree(&options("whole").output, "", &mut whole);
-    tree(&options("resumed").output, "", &mut resumed);
-    assert!(whole == resumed);
+    let about = fs::metadata(options("resumed").output.join(&written.key)).unwrap();
+    assert_eq!(about.modified().unwrap(), long_ago);
+    assert!(files_of(&options("whole").output) == files_of(&options("resumed").output));
+}
+
+#[test]
+fn a_build_of_the_same_file_read_otherwise_starts_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("hills.asc");
+    let mut text = "ncols 150\nnrows 140\nxllcorner 0\nyllcorner 0\ncellsize 10\n".to_owned();
+    for row in 0..140 {
+        let line: Vec<_> = (0..150)
+            .map(|column| hills(row, column).to_string())
+            .collect();
+        text += &format!("{}\n", line.join(" "));
+    }
+    fs::write(&file, text).unwrap();
+    let read = |scale, nodata| {
+        let options = OpenOptions {
+            scale: Some(scale),
+            nodata,
+            ..OpenOptions::default()
+        };
+        dem::open(&file, &options).unwrap()
+    };
+    let others = [read(3.0, None), read(2.0, Some(hills(70, 70)))];
+    for (index, other) in others.iter().enumerate() {
+        let [fresh, resumed] =
+            ["fresh", "resumed"].map(|name| resumable(folder.path(), &format!("{name}{index}")));
+        run(other.as_ref(), &fresh).unwrap();
+        stop_at_first_shard(read(2.0, None).as_ref(), &resumed);
+        run(other.as_ref(), &resumed).unwrap();
+        assert!(files_of(&fresh.output) == files_of(&resumed.output));
+    }
+}
+
+#[test]
+fn a_build_stops_at_the_next_block_of_a_level() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = BuildOptions {
+        memory_budget: Some(54 << 20),
+        ..options(folder.path(), "out", 1)
+    };
+    let cancel = AtomicBool::new(false);
+    let heard = std::sync::Mutex::new(Vec::new());
+    let stop = |progress: Progress| {
+        heard.lock().unwrap().push(progress);
+        if progress.stage == Stage::Fit && progress.done == 1 {
+            cancel.store(true, std::sync::atomic::Ordering::Relaxed);
+        }
+    };
+    let stopped = build(&Field::new(700, 421, hills), None, &options, &stop, &cancel);
+    assert!(matches!(stopped, Err(PyramidError::Interrupted)));
+    let last = heard.lock().unwrap().pop().unwrap();
+    assert_eq!((last.stage, last.done), (Stage::Fit, 1));
+    // Blocks of half a tile a side, and 4 × 2 tiles in the first plane that is fitted.
+    assert!(last.total > 8 * 4, "{last:?}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
 #[test]

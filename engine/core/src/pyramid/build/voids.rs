@@ -14,6 +14,7 @@
 use std::path::Path;
 
 use super::area::{Area, Blocks, to_signed};
+use super::options::Watch;
 use super::passes::in_order;
 use super::planes::SamplePlane;
 use super::samples::Samples;
@@ -24,57 +25,93 @@ const SWEEPS: usize = 8;
 /// Cells around a block that decide it: one a half sweep.
 const HALO: usize = 2 * SWEEPS;
 
-/// Fills the void samples of the first rows and columns of a plane, of which some are known; `side` samples a side of
-/// a block.
-pub(super) fn fill(
-    finest: &SamplePlane,
-    data: [usize; 2],
-    scratch: &Path,
-    side: usize,
-) -> Result<(), PyramidError> {
-    let mut planes = Vec::<SamplePlane>::new();
-    let mut size = data;
-    loop {
-        let name = format!("void-{}", planes.len());
-        let half = size.map(|count| count.div_ceil(2));
-        let coarse = SamplePlane::create(scratch, &name, half)?;
-        let gaps = pull(planes.last().unwrap_or(finest), size, &coarse, side / 2)?;
-        planes.push(coarse);
-        size = half;
-        if !gaps {
-            break;
-        }
-    }
-    while let Some(coarser) = planes.pop() {
-        match planes.last() {
-            Some(plane) => push(plane, plane.size(), &coarser, side)?,
-            None => push(finest, data, &coarser, side)?,
-        }
-        coarser.remove()?;
-    }
-    Ok(())
+/// How gaps are filled.
+pub(super) struct Gaps<'a> {
+    /// Where the halved planes are made, and removed.
+    pub(super) scratch: &'a Path,
+    /// Samples a side of a block.
+    pub(super) side: usize,
+    /// Asked before every block whether to go on.
+    pub(super) watch: &'a Watch<'a>,
 }
 
-/// Halves a plane: the mean of the known finer cells, a gap where no finer cell is known. True where gaps are left.
-fn pull(
-    fine: &SamplePlane,
-    fine_size: [usize; 2],
-    coarse: &SamplePlane,
-    side: usize,
-) -> Result<bool, PyramidError> {
-    let blocks = Blocks::new(coarse.size(), side);
-    let block = |index| {
-        let area = blocks.area(index);
-        let double = |range: &std::ops::Range<i64>| 2 * range.start..2 * range.end;
-        let below = Area {
-            rows: double(&area.rows),
-            columns: double(&area.columns),
+impl Gaps<'_> {
+    /// Fills the void samples of the first rows and columns of a plane, of which some are known.
+    pub(super) fn fill(&self, finest: &SamplePlane, data: [usize; 2]) -> Result<(), PyramidError> {
+        let mut planes = Vec::<SamplePlane>::new();
+        let mut size = data;
+        loop {
+            let name = format!("void-{}", planes.len());
+            let half = size.map(|count| count.div_ceil(2));
+            let coarse = SamplePlane::create(self.scratch, &name, half)?;
+            let gaps = self.pull(planes.last().unwrap_or(finest), size, &coarse)?;
+            planes.push(coarse);
+            size = half;
+            if !gaps {
+                break;
+            }
+        }
+        while let Some(coarser) = planes.pop() {
+            match planes.last() {
+                Some(plane) => self.push(plane, plane.size(), &coarser)?,
+                None => self.push(finest, data, &coarser)?,
+            }
+            coarser.remove()?;
+        }
+        Ok(())
+    }
+
+    /// Halves a plane: the mean of the known finer cells, a gap where no finer cell is known. True where gaps are left.
+    fn pull(
+        &self,
+        fine: &SamplePlane,
+        fine_size: [usize; 2],
+        coarse: &SamplePlane,
+    ) -> Result<bool, PyramidError> {
+        let blocks = Blocks::new(coarse.size(), self.side / 2);
+        let block = |index| {
+            self.watch.check()?;
+            let area = blocks.area(index);
+            let double = |range: &std::ops::Range<i64>| 2 * range.start..2 * range.end;
+            let below = Area {
+                rows: double(&area.rows),
+                columns: double(&area.columns),
+            };
+            let mean = mean_of_known(&fine.read(&below.and(&Area::whole(fine_size)))?, &area);
+            coarse.write(&area, &mean)?;
+            Ok(mean.voids.is_some())
         };
-        let mean = mean_of_known(&fine.read(&below.and(&Area::whole(fine_size)))?, &area);
-        coarse.write(&area, &mean)?;
-        Ok(mean.voids.is_some())
-    };
-    in_order(blocks.count(), block, |a, b| a | b)
+        in_order(blocks.count(), block, |a, b| a | b)
+    }
+
+    /// Fills the gaps of a plane's first rows and columns from a filled coarser plane.
+    fn push(
+        &self,
+        plane: &SamplePlane,
+        size: [usize; 2],
+        coarser: &SamplePlane,
+    ) -> Result<(), PyramidError> {
+        let blocks = Blocks::new(size, self.side);
+        let block = |index| {
+            self.watch.check()?;
+            let area = blocks.area(index);
+            if plane.read(&area)?.voids.is_none() {
+                return Ok(());
+            }
+            let halo = area.grown([HALO, HALO]).and(&Area::whole(size));
+            let mut window = plane.read(&halo)?;
+            let half = |range: &std::ops::Range<i64>| range.start / 2..(range.end - 1) / 2 + 1;
+            let above = Area {
+                rows: half(&halo.rows),
+                columns: half(&halo.columns),
+            };
+            let above = above.grown([1, 1]).and(&Area::whole(coarser.size()));
+            start(&mut window, &coarser.read(&above)?);
+            relax(&mut window);
+            plane.write(&area, &window)
+        };
+        in_order(blocks.count(), block, |(), ()| ())
+    }
 }
 
 fn mean_of_known(fine: &Samples, area: &Area) -> Samples {
@@ -99,34 +136,6 @@ fn mean_of_known(fine: &Samples, area: &Area) -> Samples {
         }
     }
     coarse
-}
-
-/// Fills the gaps of a plane's first rows and columns from a filled coarser plane.
-fn push(
-    plane: &SamplePlane,
-    size: [usize; 2],
-    coarser: &SamplePlane,
-    side: usize,
-) -> Result<(), PyramidError> {
-    let blocks = Blocks::new(size, side);
-    let block = |index| {
-        let area = blocks.area(index);
-        if plane.read(&area)?.voids.is_none() {
-            return Ok(());
-        }
-        let halo = area.grown([HALO, HALO]).and(&Area::whole(size));
-        let mut window = plane.read(&halo)?;
-        let half = |range: &std::ops::Range<i64>| range.start / 2..(range.end - 1) / 2 + 1;
-        let above = Area {
-            rows: half(&halo.rows),
-            columns: half(&halo.columns),
-        };
-        let above = above.grown([1, 1]).and(&Area::whole(coarser.size()));
-        start(&mut window, &coarser.read(&above)?);
-        relax(&mut window);
-        plane.write(&area, &window)
-    };
-    in_order(blocks.count(), block, |(), ()| ())
 }
 
 /// Gives every gap the coarser plane's height there.
@@ -195,6 +204,8 @@ fn mean(sum: i64, count: i64) -> i32 {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::AtomicBool;
+
     use super::*;
 
     fn filled(side: usize, block: usize, height: impl Fn(usize, usize) -> Option<i32>) -> Samples {
@@ -209,7 +220,13 @@ mod tests {
             }
         }
         plane.write(&all, &samples).unwrap();
-        fill(&plane, [side, side], folder.path(), block).unwrap();
+        let cancel = AtomicBool::new(false);
+        let gaps = Gaps {
+            scratch: folder.path(),
+            side: block,
+            watch: &Watch::new(&|_| (), &cancel),
+        };
+        gaps.fill(&plane, [side, side]).unwrap();
         plane.read(&all).unwrap()
     }
 
@@ -247,6 +264,20 @@ mod tests {
             })
         });
         assert!(sides[0] == sides[1] && sides[1] == sides[2]);
+    }
+
+    #[test]
+    fn whoever_cancels_is_heard_before_the_first_block() {
+        let folder = tempfile::tempdir().unwrap();
+        let plane = SamplePlane::create(folder.path(), "never written", [9, 9]).unwrap();
+        let cancel = AtomicBool::new(true);
+        let gaps = Gaps {
+            scratch: folder.path(),
+            side: 4,
+            watch: &Watch::new(&|_| (), &cancel),
+        };
+        let stopped = gaps.fill(&plane, [9, 9]);
+        assert!(matches!(stopped, Err(PyramidError::Interrupted)));
     }
 
     #[test]

@@ -27,11 +27,11 @@ use serde::{Deserialize, Serialize};
 
 use self::{
     block::Block,
-    place::{check_target, claim, remove_folder, remove_if_there, settle_replacement, start_over},
+    place::{check_target, claim, remove_if_there, settle_replacement, start_over},
 };
 use super::{
     COLOR_TEXELS, Metadata, PyramidError, RecordLayout,
-    files::{sibling, sync_folder, write_whole, write_whole_with},
+    files::{remove_folder, sibling, sync_folder, write_whole, write_whole_with},
     shard::shard_count,
     zarr,
 };
@@ -202,8 +202,9 @@ impl PyramidWriter {
         self.write_block(key, &block, records)
     }
 
-    /// The folder for what passes of the build leave for each other: it goes with the build or is removed by
-    /// [`Self::publish`].
+    /// The folder for what passes of the build leave for each other. Nothing in it outlives the run: whoever fills it
+    /// removes it when the run ends, however it does, and when it starts, for runs that were killed;
+    /// [`Self::publish`] leaves none.
     #[must_use]
     pub fn scratch(&self) -> PathBuf {
         self.folder.join(SCRATCH)

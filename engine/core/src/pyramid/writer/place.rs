@@ -7,7 +7,11 @@ use std::{
 };
 
 use super::{MARKER, SCRATCH};
-use crate::pyramid::{PyramidError, files::sibling, zarr};
+use crate::pyramid::{
+    PyramidError,
+    files::{remove_folder, sibling},
+    zarr,
+};
 
 /// True for a folder with a pyramid's root in it, of whatever version.
 pub(super) fn is_pyramid(path: &Path) -> bool {
@@ -97,13 +101,6 @@ pub(super) fn start_over(
 
 pub(super) fn remove_if_there(path: &Path) -> Result<(), PyramidError> {
     match fs::remove_file(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
-        other => other.map_err(PyramidError::io("removing", path)),
-    }
-}
-
-pub(super) fn remove_folder(path: &Path) -> Result<(), PyramidError> {
-    match fs::remove_dir_all(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
         other => other.map_err(PyramidError::io("removing", path)),
     }
