@@ -62,7 +62,8 @@ pub(crate) struct Arguments {
     /// Replaces a pyramid that is there; never anything else
     #[arg(long)]
     overwrite: bool,
-    /// Prints what would be done (tasks, tiles, bytes, time) and builds nothing
+    /// Prints what would be done (tasks, tiles, bytes, time, from three small windows) and builds nothing; the rest of
+    /// the input, features and imagery are not tried
     #[arg(long)]
     dry_run: bool,
     /// A summary for programs on standard output
@@ -94,7 +95,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
     };
     let options = options(arguments)?;
     if arguments.dry_run {
-        let plan = plan(&*raster, imagery.as_ref(), &options)?;
+        let plan = plan(&*raster, imagery.as_ref(), &options, &cancel)?;
         print(&if arguments.json {
             format!("{:#}\n", serde_json::to_value(&plan)?)
         } else {
@@ -164,7 +165,7 @@ fn open(arguments: &Arguments) -> Result<Box<dyn Raster>> {
     let options = OpenOptions {
         spacing: arguments.spacing,
         scale: arguments.scale,
-        cache_bytes: Some(cache_bytes(arguments)),
+        cache_bytes: cache_bytes(arguments),
         ..OpenOptions::default()
     };
     let mut rasters = Vec::new();
@@ -189,12 +190,17 @@ fn open(arguments: &Arguments) -> Result<Box<dyn Raster>> {
         .ok_or_else(|| PyramidError::Refused("no input".into()).into())
 }
 
-/// Bytes of decoded parts kept for each input: together no more than one alone would have, nor than a quarter of the
-/// budget.
-fn cache_bytes(arguments: &Arguments) -> usize {
-    let budget = arguments.memory_budget.unwrap_or(u64::MAX) / 4;
-    let all = usize::try_from(budget.min(CACHE_BYTES)).unwrap_or(usize::MAX);
-    all / arguments.inputs.len().max(1)
+/// Bytes of decoded parts kept for each input: together no more than a quarter of the budget; of several inputs, no
+/// more than one has as a rule.
+fn cache_bytes(arguments: &Arguments) -> Option<usize> {
+    let quarter = arguments.memory_budget.map(|budget| budget / 4);
+    let count = arguments.inputs.len() as u64;
+    let each = if count > 1 {
+        Some(quarter.unwrap_or(CACHE_BYTES).min(CACHE_BYTES) / count)
+    } else {
+        quarter
+    };
+    each.map(|bytes| usize::try_from(bytes).unwrap_or(usize::MAX))
 }
 
 /// Reads the picture; one that says where it lies must say so in the terrain's CRS.

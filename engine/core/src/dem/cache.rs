@@ -9,7 +9,7 @@ use super::{DemError, samples::Samples};
 /// Places to wait while another thread decodes the same part.
 const DOORS: usize = 16;
 
-/// The last used parts of a file, at most so many bytes of them (and always the last one).
+/// The last used parts of a file, at most so many bytes of them: none where one part is more.
 pub(super) struct Cache {
     kept: Mutex<Kept>,
     doors: [Mutex<()>; DOORS],
@@ -34,7 +34,7 @@ impl Cache {
         }
     }
 
-    /// Bytes of the parts that are kept, but for a last one that is larger.
+    /// Bytes of the parts that are kept at most.
     pub(super) const fn budget_bytes(&self) -> usize {
         self.budget_bytes
     }
@@ -70,12 +70,15 @@ impl Cache {
     }
 
     fn keep(&self, index: usize, part: &Arc<Samples>) {
+        if part.byte_len() > self.budget_bytes {
+            return;
+        }
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         kept.bytes += part.byte_len();
         if let Some(old) = kept.parts.put(index, Arc::clone(part)) {
             kept.bytes -= old.byte_len();
         }
-        while kept.bytes > self.budget_bytes && kept.parts.len() > 1 {
+        while kept.bytes > self.budget_bytes {
             let Some((_, oldest)) = kept.parts.pop_lru() else {
                 break;
             };
@@ -102,5 +105,14 @@ mod tests {
         };
         assert!(!again(0).expect("kept") && !again(2).expect("kept"));
         assert!(again(1).expect("decoded again"));
+    }
+
+    #[test]
+    fn a_part_over_the_budget_is_not_kept_and_drives_out_none() {
+        let cache = Cache::new(10);
+        let part = |len: usize| Ok(Samples::U8(vec![0; len]));
+        cache.get(0, || part(10)).expect("decodes");
+        assert_eq!(cache.get(1, || part(11)).expect("decodes").byte_len(), 11);
+        assert!(cache.find(0).is_some() && cache.find(1).is_none());
     }
 }

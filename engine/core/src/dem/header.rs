@@ -107,7 +107,9 @@ pub struct OpenOptions {
     pub scale: Option<f64>,
     /// The stored number that means void, for files that do not declare one.
     pub nodata: Option<f64>,
-    /// Bytes of decoded strips and tiles kept for each open file; 64 MiB if not given.
+    /// The most bytes of decoded strips and tiles kept for each open file. If not given, 64 MiB, or one strip or tile
+    /// where that is more; never more than that, either. Where it is less than one, none is kept, and every window
+    /// decodes what it needs.
     pub cache_bytes: Option<usize>,
 }
 
@@ -129,8 +131,9 @@ impl OpenOptions {
         }
     }
 
-    /// The budget for decoded strips and tiles.
-    pub(crate) fn cache_bytes(&self) -> usize {
-        self.cache_bytes.unwrap_or(64 << 20)
+    /// The budget for decoded parts of so many bytes, of which `usual` bytes do.
+    pub(crate) fn kept_bytes(&self, usual: usize, part_bytes: u64) -> usize {
+        let most = usual.max(usize::try_from(part_bytes).unwrap_or(usize::MAX));
+        self.cache_bytes.map_or(most, |bytes| bytes.min(most))
     }
 }

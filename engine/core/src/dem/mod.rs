@@ -58,6 +58,11 @@ pub trait Raster: Send + Sync {
 
     /// Bytes it keeps in memory at most, besides a few a part.
     fn memory_bytes(&self) -> u64;
+
+    /// Bytes that one call of [`Self::read`] takes at most while it runs, for a window of so many samples.
+    fn read_bytes(&self, _samples: u64) -> u64 {
+        0
+    }
 }
 
 /// Opens an elevation model of any known format, told by its content.

@@ -118,6 +118,13 @@ impl Raster for Mosaic {
             .map(|part| part.raster.memory_bytes())
             .sum()
     }
+
+    fn read_bytes(&self, samples: u64) -> u64 {
+        let parts = self.parts.iter();
+        let most = parts.map(|part| part.raster.read_bytes(samples)).max();
+        // Beside it, the heights of one of the rasters.
+        samples * size_of::<f64>() as u64 + most.unwrap_or(0)
+    }
 }
 
 impl Part {

@@ -91,4 +91,9 @@ impl Raster for Plain {
     fn memory_bytes(&self) -> u64 {
         0
     }
+
+    fn read_bytes(&self, samples: u64) -> u64 {
+        // A row of the window, as stored and as numbers.
+        2 * samples.min(self.header.grid.columns.into()) * u64::from(self.rows.kind.bytes())
+    }
 }

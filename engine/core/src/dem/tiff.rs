@@ -27,6 +27,9 @@ use super::{DemError, OpenOptions, Raster, RasterHeader, Window};
 /// Void in 16-bit models that declare none: no place known lies so deep.
 const UNDECLARED_VOID: f64 = -32768.0;
 
+/// Bytes of decoded strips or tiles that are kept, if not one is more.
+const CACHE_BYTES: usize = 64 << 20;
+
 /// An open TIFF.
 pub(super) struct Tiff {
     header: RasterHeader,
@@ -55,8 +58,8 @@ impl Tiff {
             reading: scaling.label(),
             source: bytes.source(),
         };
-        let mask = Mask::find(&bytes, &ifd, &table)?;
-        let chunks = Chunks::new(coding, table, options.cache_bytes());
+        let mask = Mask::find(&bytes, &ifd, &table, options)?;
+        let chunks = Chunks::new(coding, table, CACHE_BYTES, options);
         Ok(Self {
             header,
             bytes,
@@ -96,7 +99,16 @@ impl Raster for Tiff {
     }
 
     fn memory_bytes(&self) -> u64 {
-        self.chunks.memory_bytes()
+        let mask = self.mask.as_ref().map_or(0, Mask::memory_bytes);
+        self.chunks.memory_bytes() + mask
+    }
+
+    fn read_bytes(&self, samples: u64) -> u64 {
+        let mask = self
+            .mask
+            .as_ref()
+            .map_or(0, |mask| mask.read_bytes(samples));
+        self.chunks.read_bytes().max(mask)
     }
 }
 

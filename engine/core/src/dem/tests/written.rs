@@ -149,6 +149,41 @@ fn declared_void_is_nan() {
 }
 
 #[test]
+fn the_strips_kept_and_decoded_are_counted() {
+    let folder = TempDir::new().expect("a folder");
+    let deflate = Compression::Deflate(DeflateLevel::Fast);
+    let bytes = tiff::<colortype::GrayI16, ::tiff::encoder::TiffKindStandard>(
+        &hill(),
+        deflate,
+        Predictor::None,
+    );
+    let path = save(&folder, "strips.tif", &bytes);
+    let opened = |cache_bytes| {
+        let options = OpenOptions {
+            cache_bytes,
+            ..OpenOptions::default()
+        };
+        open(&path, &options).expect("readable")
+    };
+    // Strips of 5 rows of 2 bytes a sample, 4 of them.
+    let strip = 5 * 2 * COLUMNS as usize;
+    for (asked, kept) in [
+        (None, 4 * strip),
+        (Some(usize::MAX), 4 * strip),
+        (Some(strip), strip),
+        (Some(strip - 1), 0),
+    ] {
+        assert_eq!(opened(asked).memory_bytes(), kept as u64, "{asked:?}");
+    }
+    let one = opened(Some(strip));
+    let read = one.read_bytes(100);
+    assert!((strip as u64..bytes.len() as u64 * 2 + strip as u64).contains(&read));
+    let mosaic = Mosaic::new(vec![opened(Some(strip)), opened(Some(0)), one]).expect("they fit");
+    assert_eq!(mosaic.memory_bytes(), 2 * strip as u64);
+    assert_eq!(mosaic.read_bytes(100), 800 + read);
+}
+
+#[test]
 fn mosaics_take_the_later_and_fill_its_voids() {
     let folder = TempDir::new().expect("a folder");
     let grid = |west: f64, values: &str| {

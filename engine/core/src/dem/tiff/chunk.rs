@@ -72,6 +72,15 @@ impl Coding {
         u64::from(self.bits / 8) * u64::from(self.bands)
     }
 
+    /// Bytes of them in memory: halves become singles.
+    pub(super) fn decoded_bytes(&self) -> u64 {
+        if self.format == 3 && self.bits == 16 {
+            2 * self.bytes()
+        } else {
+            self.bytes()
+        }
+    }
+
     /// True when the numbers are whole.
     pub(super) fn is_whole(&self) -> bool {
         self.format != 3

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::super::{DemError, Window, bytes::Bytes, cache::Cache, samples::Samples};
+use super::super::{DemError, OpenOptions, Window, bytes::Bytes, cache::Cache, samples::Samples};
 use super::chunk::Coding;
 use super::table::Table;
 
@@ -24,17 +24,36 @@ pub(super) struct Run<'a> {
 }
 
 impl Chunks {
-    pub(super) fn new(coding: Coding, table: Table, cache_bytes: usize) -> Self {
+    /// Keeps `usual_bytes` of what is decoded, or what the options say.
+    pub(super) fn new(
+        coding: Coding,
+        table: Table,
+        usual_bytes: usize,
+        options: &OpenOptions,
+    ) -> Self {
+        let budget = options.kept_bytes(usual_bytes, table.chunk_bytes(&coding));
         Self {
             coding,
             table,
-            cache: Cache::new(cache_bytes),
+            cache: Cache::new(budget),
         }
     }
 
     /// Bytes of decoded strips or tiles that are kept at most.
     pub(super) fn memory_bytes(&self) -> u64 {
-        self.cache.budget_bytes() as u64
+        let (budget, part) = (
+            self.cache.budget_bytes() as u64,
+            self.table.chunk_bytes(&self.coding),
+        );
+        if part > budget {
+            return 0;
+        }
+        budget.min(part * self.table.plane_len() as u64)
+    }
+
+    /// Bytes that a window takes while it is read: one strip or tile decoded, and what it is decoded from, twice.
+    pub(super) fn read_bytes(&self) -> u64 {
+        self.table.chunk_bytes(&self.coding) + 2 * self.table.most_stored_bytes()
     }
 
     /// Visits every sample of a stored window once, in rows.

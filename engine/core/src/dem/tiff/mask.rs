@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::super::{DemError, Window, bytes::Bytes, samples::Samples};
+use super::super::{DemError, OpenOptions, Window, bytes::Bytes, samples::Samples};
 use super::chunk::Coding;
 use super::chunks::Chunks;
 use super::ifd::{Ifd, tag};
@@ -13,7 +13,7 @@ const MAX_DIRECTORIES: usize = 64;
 /// "A transparency mask" among the bits of a directory's kind; and "a smaller version", which must not be set.
 const IS_MASK: u64 = 4;
 const IS_REDUCED: u64 = 1;
-/// Bytes of decoded masks that are kept.
+/// Bytes of decoded masks that are kept, if not one part is more.
 const CACHE_BYTES: usize = 4 << 20;
 
 /// An image's mask, eight samples a byte.
@@ -25,6 +25,7 @@ impl Mask {
         bytes: &Bytes,
         first: &Ifd,
         image: &Table,
+        options: &OpenOptions,
     ) -> Result<Option<Self>, DemError> {
         let mut seen = BTreeSet::new();
         let mut next = first.next;
@@ -36,14 +37,19 @@ impl Mask {
             let kind = ifd.number(bytes, tag::SUBFILE_KIND)?.unwrap_or(0);
             let bits = ifd.short(bytes, tag::BITS, 1)?;
             if kind & IS_MASK != 0 && kind & IS_REDUCED == 0 && bits == 1 {
-                return Self::read(bytes, &ifd, image);
+                return Self::read(bytes, &ifd, image, options);
             }
             next = ifd.next;
         }
         Ok(None)
     }
 
-    fn read(bytes: &Bytes, ifd: &Ifd, image: &Table) -> Result<Option<Self>, DemError> {
+    fn read(
+        bytes: &Bytes,
+        ifd: &Ifd,
+        image: &Table,
+        options: &OpenOptions,
+    ) -> Result<Option<Self>, DemError> {
         let coding = Coding {
             bits: 8,
             predictor: 1,
@@ -57,7 +63,18 @@ impl Mask {
         }
         let table = Table::read_packed(bytes, ifd, &coding)?;
         let same_size = table.width == image.width.div_ceil(8) && table.height == image.height;
-        Ok(same_size.then(|| Self(Chunks::new(coding, table, CACHE_BYTES))))
+        Ok(same_size.then(|| Self(Chunks::new(coding, table, CACHE_BYTES, options))))
+    }
+
+    /// Bytes of it that are kept at most.
+    pub(super) fn memory_bytes(&self) -> u64 {
+        self.0.memory_bytes()
+    }
+
+    /// Bytes that a window of so many samples takes while it is masked.
+    pub(super) fn read_bytes(&self, samples: u64) -> u64 {
+        // Eight samples a byte; the first and last byte of a row may be shared with what lies beside.
+        self.0.read_bytes() + samples.div_ceil(4)
     }
 
     /// Makes void what it masks out of a stored window.

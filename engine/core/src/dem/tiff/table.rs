@@ -104,6 +104,18 @@ impl Table {
         self.across() as usize * self.down() as usize
     }
 
+    /// Bytes of a chunk's numbers in memory.
+    pub(super) fn chunk_bytes(&self, coding: &Coding) -> u64 {
+        let samples = u64::from(self.chunk_columns) * u64::from(self.chunk_rows);
+        samples.saturating_mul(coding.decoded_bytes())
+    }
+
+    /// Bytes of the chunk that takes most in the file.
+    pub(super) fn most_stored_bytes(&self) -> u64 {
+        let counts = self.places.iter().map(|&(_, count)| count);
+        counts.max().unwrap_or(0)
+    }
+
     /// First byte and number of bytes of a chunk; none when the file leaves it out.
     pub(super) fn place(&self, index: usize) -> Option<(u64, u64)> {
         self.places
@@ -233,8 +245,7 @@ impl Table {
     }
 
     fn check(&self, bytes: &Bytes, coding: &Coding) -> Result<(), DemError> {
-        let sample_count = u64::from(self.chunk_columns) * u64::from(self.chunk_rows);
-        if sample_count.saturating_mul(coding.bytes()) > MAX_CHUNK_BYTES {
+        if self.chunk_bytes(coding) > MAX_CHUNK_BYTES {
             let what = format!(
                 "a {} of {} x {} samples",
                 self.name, self.chunk_columns, self.chunk_rows

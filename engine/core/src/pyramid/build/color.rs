@@ -52,10 +52,15 @@ pub(super) fn write(
     ))
 }
 
+/// Levels of imagery that a picture makes.
+pub(super) fn level_count(image: &Image, grid: &Grid) -> u8 {
+    Placed::new(image, grid).level_count(grid)
+}
+
 /// Bytes the imagery takes while it is built, besides the picture itself.
 pub(super) fn memory_bytes(image: &Image, grid: &Grid) -> u64 {
     let [rows, columns] = grid
-        .tiles(Placed::new(image, grid).level_count(grid) - 1)
+        .tiles(level_count(image, grid) - 1)
         .map(|count| u64::from(count) * STEPS as u64 + 1);
     rows * columns * 5 + image.rgb.len() as u64
 }

@@ -1,6 +1,8 @@
 //! What a build would do, told without doing it: its tasks, and time and bytes from building a few small windows.
 
 use std::fs;
+use std::io::ErrorKind;
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use serde::Serialize;
@@ -10,10 +12,11 @@ use super::border::plane_size;
 use super::levels::{fit_blocks, tile_count};
 use super::options::{BuildOptions, Imagery, Stage};
 use super::plan::Shape;
-use super::{Plan, build, errors, read};
+use super::{Plan, build, color, errors, read};
 use crate::dem::{DemError, Raster, RasterHeader, Window};
 use crate::geo::{Grid, TILE_CELLS};
-use crate::pyramid::files::sibling;
+use crate::pyramid::files::remove_folder;
+use crate::pyramid::writer::check_target;
 use crate::pyramid::{PyramidError, shard_count};
 
 /// Samples a side of a window that is built to see what a tile takes: eight tiles.
@@ -59,17 +62,22 @@ pub struct PassPlan {
 
 /// Plans a build: the same plan that [`build`] goes by.
 ///
-/// Three windows of 1025 × 1025 samples are built beside the output and removed again, for the estimates.
+/// Three windows of 1025 × 1025 samples are built in the system's folder for temporary files and removed again, for the
+/// estimates; that stops when `cancel` becomes true. Not tried are the rest of the raster (damage or a height out of
+/// range there shows when it is built), features, imagery, and whether the output's disk has room. The times are of
+/// this disk and of one thread at work, divided by the threads.
 ///
 /// # Errors
-/// As [`build`].
+/// As [`build`], as far as it is tried.
 pub fn plan(
     raster: &dyn Raster,
     imagery: Option<&Imagery<'_>>,
     options: &BuildOptions,
+    cancel: &AtomicBool,
 ) -> Result<BuildPlan, PyramidError> {
+    check_target(&options.output, options.overwrite)?;
     let Plan { grid, shape, .. } = Plan::new(raster, imagery, options)?;
-    let estimate = estimate(raster, options)?;
+    let estimate = estimate(raster, options, cancel)?;
     let finest = tile_count(&grid, grid.level_count() - 1) as f64;
     #[expect(
         clippy::cast_possible_truncation,
@@ -87,13 +95,18 @@ pub fn plan(
         block_tiles: shape.block_tiles,
         memory_bytes: shape.memory_bytes,
         scratch_bytes: scratch_bytes(&grid),
-        passes: passes(raster, &grid, &shape),
+        passes: passes(raster, imagery, &grid, &shape),
         height_bytes,
         seconds: estimate.map(|[_, seconds]| seconds * finest / shape.threads as f64),
     })
 }
 
-fn passes(raster: &dyn Raster, grid: &Grid, shape: &Shape) -> Vec<PassPlan> {
+fn passes(
+    raster: &dyn Raster,
+    imagery: Option<&Imagery<'_>>,
+    grid: &Grid,
+    shape: &Shape,
+) -> Vec<PassPlan> {
     let side = shape.block_side();
     let finest = grid.level_count() - 1;
     let settled = |level: u8| {
@@ -102,16 +115,19 @@ fn passes(raster: &dyn Raster, grid: &Grid, shape: &Shape) -> Vec<PassPlan> {
             .map(|count| count as usize * TILE_CELLS + 1);
         Blocks::new(size, side).count() as u64
     };
-    let shards = |level: u8| -> u64 {
-        let [rows, columns] = shard_count(grid.tiles(level)).map(u64::from);
-        rows * columns
+    let shards = |levels: std::ops::Range<u8>| -> u64 {
+        levels
+            .map(|level| shard_count(grid.tiles(level)).map(u64::from))
+            .map(|[rows, columns]| rows * columns)
+            .sum()
     };
     let pass = |stage: Stage, levels: std::ops::Range<u8>, tasks: u64| PassPlan {
         name: stage.label(),
         tasks,
         tiles: levels.map(|level| tile_count(grid, level)).sum(),
     };
-    vec![
+    let all = 0..finest + 1;
+    let mut passes = vec![
         pass(
             Stage::Read,
             finest..finest + 1,
@@ -124,14 +140,15 @@ fn passes(raster: &dyn Raster, grid: &Grid, shape: &Shape) -> Vec<PassPlan> {
                 .map(|level| fit_blocks(grid, level, side).count() as u64)
                 .sum(),
         ),
-        pass(
-            Stage::Encode,
-            0..finest + 1,
-            (0..=finest).map(settled).sum(),
-        ),
+        pass(Stage::Encode, all.clone(), all.clone().map(settled).sum()),
         pass(Stage::Measure, 0..finest, errors::block_count(grid)),
-        pass(Stage::Write, 0..finest + 1, (0..=finest).map(shards).sum()),
-    ]
+        pass(Stage::Write, all.clone(), shards(all)),
+    ];
+    if let Some(imagery) = imagery {
+        let levels = 0..color::level_count(imagery.image, grid);
+        passes.push(pass(Stage::Color, levels.clone(), shards(levels)));
+    }
+    passes
 }
 
 /// Bytes of planes at the peak: while the finest level is settled, its fitted samples and all settled ones and cages.
@@ -145,11 +162,15 @@ fn scratch_bytes(grid: &Grid) -> u64 {
 }
 
 /// Bytes and seconds of one thread a finest tile takes, those of all levels above it included.
-fn estimate(raster: &dyn Raster, options: &BuildOptions) -> Result<Option<[f64; 2]>, PyramidError> {
+fn estimate(
+    raster: &dyn Raster,
+    options: &BuildOptions,
+    cancel: &AtomicBool,
+) -> Result<Option<[f64; 2]>, PyramidError> {
     let grid = raster.header().grid;
-    let output = sibling(&options.output, ".dry-run");
+    let folder = Temporary::new()?;
     let options = BuildOptions {
-        output: output.clone(),
+        output: folder.0.join("window"),
         overwrite: true,
         threads: Some(1),
         sources: Vec::new(),
@@ -160,13 +181,12 @@ fn estimate(raster: &dyn Raster, options: &BuildOptions) -> Result<Option<[f64; 
     for index in 0..SAMPLE_COUNT {
         let part = Part::new(raster, SAMPLE_SIDE, [index, SAMPLE_COUNT - 1]);
         let level = part.header.grid.level_count() - 1;
-        let report = match build(&part, None, &options, &|_| (), &AtomicBool::new(false)) {
+        let report = match build(&part, None, &options, &|_| (), cancel) {
             Ok(report) => report,
             // A window without any height tells nothing.
             Err(PyramidError::Unfit(_)) if part.is_void()? => continue,
             Err(error) => return Err(error),
         };
-        fs::remove_dir_all(&output).map_err(PyramidError::io("removing", &output))?;
         tiles += tile_count(&part.header.grid, level) as f64;
         sums[0] += report.height_bytes as f64;
         sums[1] += report.seconds;
@@ -175,6 +195,35 @@ fn estimate(raster: &dyn Raster, options: &BuildOptions) -> Result<Option<[f64; 
         }
     }
     Ok((tiles > 0.0).then(|| sums.map(|sum| sum / tiles)))
+}
+
+/// A new folder of the system's for temporary files, removed when it is dropped.
+struct Temporary(PathBuf);
+
+impl Temporary {
+    fn new() -> Result<Self, PyramidError> {
+        let (all, process) = (std::env::temp_dir(), std::process::id());
+        for number in 0_u32.. {
+            let folder = all.join(format!("drumlin-dry-run-{process}-{number}"));
+            match fs::create_dir(&folder) {
+                Ok(()) => return Ok(Self(folder)),
+                // Another's: what is there is never touched.
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(PyramidError::io("creating", folder)(error)),
+            }
+        }
+        Err(PyramidError::Refused(format!(
+            "{}: is full of dry runs",
+            all.display()
+        )))
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        // What cannot be removed is the system's to clear, as all in that folder.
+        let _ = remove_folder(&self.0);
+    }
 }
 
 /// A window of a raster.
@@ -238,6 +287,10 @@ impl Raster for Part<'_> {
     fn memory_bytes(&self) -> u64 {
         self.raster.memory_bytes()
     }
+
+    fn read_bytes(&self, samples: u64) -> u64 {
+        self.raster.read_bytes(samples)
+    }
 }
 
 #[cfg(test)]
@@ -258,7 +311,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let options = options(folder.path());
         let raster = Field::new(1500, 1300, hills);
-        let plan = plan(&raster, None, &options).unwrap();
+        let plan = plan(&raster, None, &options, &AtomicBool::new(false)).unwrap();
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
         let report = build(&raster, None, &options, &|_| (), &AtomicBool::new(false)).unwrap();
         assert_eq!(
@@ -274,9 +327,43 @@ mod tests {
     fn a_raster_void_where_it_is_tried_has_a_plan_without_estimates() {
         let folder = tempfile::tempdir().unwrap();
         let raster = Field::new(4200, 40, |row, _| if row == 1100 { 5.0 } else { f64::NAN });
-        let plan = plan(&raster, None, &options(folder.path())).unwrap();
+        let plan = plan(
+            &raster,
+            None,
+            &options(folder.path()),
+            &AtomicBool::new(false),
+        )
+        .unwrap();
         assert_eq!((plan.height_bytes, plan.seconds), (None, None));
         assert_eq!(plan.passes.len(), 5);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn a_plan_refuses_what_the_build_refuses_and_touches_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = options(folder.path());
+        let raster = Field::new(60, 70, hills);
+        let planned = |options: &BuildOptions, cancel: bool| {
+            plan(&raster, None, options, &AtomicBool::new(cancel)).map(|_| ())
+        };
+        // Something of the user's with a likely name.
+        let mine = BuildOptions {
+            output: folder.path().join("out.dry-run"),
+            ..options.clone()
+        };
+        build(&raster, None, &mine, &|_| (), &AtomicBool::new(false)).unwrap();
+        planned(&options, false).unwrap();
+        let stopped = planned(&options, true);
+        assert!(matches!(stopped, Err(PyramidError::Interrupted)));
+        let refused = planned(&mine, false);
+        assert!(matches!(refused, Err(PyramidError::Refused(_))));
+        let overwrite = BuildOptions {
+            overwrite: true,
+            ..mine.clone()
+        };
+        planned(&overwrite, false).unwrap();
+        assert!(mine.output.join("zarr.json").exists());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 }

@@ -24,7 +24,7 @@ pub struct BuildOptions {
     /// Threads; by default as many as the machine has cores. The bytes do not depend on it.
     pub threads: Option<usize>,
     /// Memory the build may take, in bytes: blocks are cut to fit, on fewer threads where they must; refused beforehand
-    /// where that is too little. The bytes do not depend on it.
+    /// where that is too little. The cages of features, small as a rule, come on top. The bytes do not depend on it.
     pub memory_budget: Option<u64>,
     /// Zero of the heights, where the caller knows.
     pub vertical: VerticalReference,

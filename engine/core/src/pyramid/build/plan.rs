@@ -79,7 +79,8 @@ impl Shape {
         let window_samples = (side * side) as u64;
         // A plane's last block of a row or column takes the plane's last sample too.
         let block = ((side + 1 + 2 * HALO) as u64).pow(2) * BLOCK_SAMPLE_BYTES;
-        let window = read::window_samples(raster, window_samples) * WINDOW_SAMPLE_BYTES;
+        let samples = read::window_samples(raster, window_samples);
+        let window = samples * WINDOW_SAMPLE_BYTES + raster.read_bytes(samples);
         let memory_bytes = fixed + threads as u64 * (THREAD_BYTES + block.max(window));
         Self {
             threads,

@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 
 use self::{
     block::Block,
-    place::{check_target, claim, remove_if_there, settle_replacement, start_over},
+    place::{claim, remove_if_there, settle_replacement, start_over},
 };
 use super::{
     COLOR_TEXELS, Metadata, PyramidError, RecordLayout,
@@ -37,6 +37,7 @@ use super::{
 };
 
 pub use block::Contents;
+pub(super) use place::check_target;
 
 /// Says that a folder is a build, and of what.
 const MARKER: &str = "unfinished";
@@ -92,12 +93,6 @@ impl PyramidWriter {
     ///
     /// As [`Self::create`].
     pub fn resume(path: &Path, overwrite: bool, fingerprint: &str) -> Result<Self, PyramidError> {
-        if path.file_name().is_none() {
-            return Err(PyramidError::Refused(format!(
-                "{}: not a name for a pyramid",
-                path.display()
-            )));
-        }
         settle_replacement(path)?;
         check_target(path, overwrite)?;
         let folder = sibling(path, ".building");

@@ -18,8 +18,14 @@ pub(super) fn is_pyramid(path: &Path) -> bool {
     fs::read(path.join(zarr::NODE)).is_ok_and(|bytes| zarr::is_root(&bytes))
 }
 
-/// Refuses what must not be replaced.
-pub(super) fn check_target(path: &Path, overwrite: bool) -> Result<(), PyramidError> {
+/// Refuses what is no name, and what must not be replaced.
+pub(in crate::pyramid) fn check_target(path: &Path, overwrite: bool) -> Result<(), PyramidError> {
+    if path.file_name().is_none() {
+        return Err(PyramidError::Refused(format!(
+            "{}: not a name for a pyramid",
+            path.display()
+        )));
+    }
     match path.symlink_metadata() {
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
         Err(error) => Err(PyramidError::io("looking at", path)(error)),
