@@ -25,16 +25,27 @@ pub fn print(text: &str) -> io::Result<()> {
     }
 }
 
-/// Writes a file that is whole or not there; what is no plain file, as `/dev/stdout`, is written to as it is.
+/// Writes a file that is whole or not there; what is no plain file, as `/dev/stdout`, is written to as it is. Of a link,
+/// the file that it leads to is written. No folder is made.
 ///
 /// # Errors
 ///
 /// What the system said, with the path.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), PyramidError> {
+    let failed = |error| PyramidError::io("writing", path)(error);
     if path.metadata().is_ok_and(|about| !about.is_file()) {
-        return fs::write(path, bytes).map_err(PyramidError::io("writing", path));
+        return fs::write(path, bytes).map_err(failed);
     }
-    write_whole(path, bytes)
+    let target = if path.is_symlink() {
+        path.canonicalize().map_err(failed)?
+    } else {
+        path.to_owned()
+    };
+    let folder = target.parent().unwrap_or(Path::new(""));
+    if !folder.as_os_str().is_empty() {
+        folder.metadata().map_err(failed)?;
+    }
+    write_whole(&target, bytes)
 }
 
 #[cfg(test)]
@@ -50,5 +61,25 @@ mod tests {
         assert_eq!(fs::read(&file).unwrap(), b"two");
         assert!(write(folder.path(), b"three").is_err());
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_missing_folder_is_an_error_and_stays_missing() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(write(&folder.path().join("none/a.obj"), b"one").is_err());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_and_what_it_leads_to_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let [file, link, nowhere] = ["a", "b", "c"].map(|name| folder.path().join(name));
+        fs::write(&file, b"one").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write(&link, b"two").unwrap();
+        assert!(link.is_symlink() && fs::read(&file).unwrap() == b"two");
+        std::os::unix::fs::symlink(folder.path().join("none"), &nowhere).unwrap();
+        assert!(write(&nowhere, b"three").is_err() && nowhere.is_symlink());
     }
 }

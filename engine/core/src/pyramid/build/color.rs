@@ -26,7 +26,12 @@ pub(super) fn write(
 ) -> Result<(ColorMetadata, Vec<ShardInfo>), PyramidError> {
     let place = Placed::new(imagery.image, grid);
     let levels = place.level_count(grid);
-    let advance = watch.stage(Stage::Color, u64::from(levels));
+    let shards_of = |level: u8| {
+        let [rows, columns] = shard_count(grid.tiles(level));
+        (0..rows).flat_map(move |row| (0..columns).map(move |column| [row, column]))
+    };
+    let total = (0..levels).map(|level| shards_of(level).count() as u64);
+    let advance = watch.stage(Stage::Color, total.sum());
     let mut lattice = Lattice::sample(&place, grid, levels - 1);
     let mut infos = Vec::new();
     for level in (0..levels).rev() {
@@ -34,12 +39,11 @@ pub(super) fn write(
         if level + 1 < levels {
             lattice = lattice.coarser(tiles);
         }
-        let [rows, columns] = shard_count(tiles);
-        for shard in (0..rows).flat_map(|row| (0..columns).map(move |column| [row, column])) {
+        for shard in shards_of(level) {
             let texels = |tile: TileId| Ok(Some(lattice.tile(tile)));
             infos.push(writer.write_color_shard(level, tiles, shard, &texels)?);
+            advance(1)?;
         }
-        advance(1)?;
     }
     let texels = u32::try_from(COLOR_TEXELS).unwrap_or(u32::MAX);
     Ok((

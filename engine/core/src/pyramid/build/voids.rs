@@ -246,8 +246,11 @@ mod tests {
         for row in 0..129 {
             for column in 0..129 {
                 let error = (level.values[row * 129 + column] - slope(row, column)).abs();
+                // A membrane over a plane is the plane. The coarsest filled plane, of cells of 16 samples, may be off by
+                // half a cell each way, 8 · (40 + 24) units, where a cell's known samples lie to one side; sweeps on
+                // four finer planes are to leave less of that than half a sample's rise.
                 let limit = if row <= 100 && hole(row, column) {
-                    120
+                    20
                 } else {
                     0
                 };
