@@ -68,7 +68,7 @@ pub struct Place {
     pub base: f64,
 }
 
-/// One frame: uploads first, then stages over the drawn list, then one indirect draw.
+/// One frame: uploads first, then stages over the drawn list, then one indirect draw for the ground and one a feature.
 #[derive(Clone, Debug, Default)]
 pub struct FramePlan {
     /// Tiles that arrived; at most the upload budget.

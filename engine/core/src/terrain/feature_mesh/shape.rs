@@ -10,6 +10,7 @@ use crate::{
         border::{QUAD_SAMPLES, TILE_CELLS},
         refine::RefineGround,
     },
+    stream::Bounds,
 };
 
 /// Where a cut lies.
@@ -81,6 +82,8 @@ pub struct FeatureShape {
     /// Heights of the border's samples, by the place they are asked for, in units.
     pub(super) heights: Vec<i32>,
     pub(super) origin: [f64; 3],
+    /// Of its cage, in world metres.
+    bounds: Bounds,
 }
 
 impl FeatureShape {
@@ -122,9 +125,11 @@ impl FeatureShape {
                 place.corner[1],
                 f64::from(base) * place.unit,
             ],
+            bounds: Bounds::default(),
             cage,
             place,
         };
+        shape.bounds = shape.find_bounds();
         shape.find_offsets().map_err(refused)?;
         Ok(shape)
     }
@@ -133,6 +138,21 @@ impl FeatureShape {
     #[must_use]
     pub fn origin(&self) -> [f64; 3] {
         self.origin
+    }
+
+    /// Its box in world metres: that of its cage, whose hull holds the surface.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    fn find_bounds(&self) -> Bounds {
+        let [min, max] = self.cage.bounds();
+        let world = |corner: [f64; 3]| [0, 1, 2].map(|axis| corner[axis] + self.origin[axis]);
+        Bounds {
+            min: world(min),
+            max: world(max),
+        }
     }
 
     /// Bytes in memory, about, for budgets.
