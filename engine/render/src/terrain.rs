@@ -1,7 +1,7 @@
 //! A terrain in an application: the planner on one side, the renderer on the other.
 //!
 //! ```text
-//! update(view) → plan (another thread) ‖ prepare(encoder): uploads, stages → draw(pass): one indirect draw
+//! update(view) → plan (another thread) ‖ prepare(encoder): uploads, stages → draw(pass): one indirect draw, and one a feature
 //! ```
 //!
 //! Follows wgpu's middleware pattern: the caller owns the device, the queue, the encoder and the pass. Nothing waits,

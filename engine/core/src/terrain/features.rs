@@ -23,10 +23,7 @@ use super::{
 use crate::{
     geo::TileId,
     pyramid::{PyramidError, Tile, feature::FeatureGroup},
-    reference::shared::{
-        TILE_CUT,
-        border::{QUAD_SAMPLES, TILE_QUADS},
-    },
+    reference::shared::{TILE_CUT, border::TILE_QUADS},
     stream::{Bounds, Drawn, Tree, View},
 };
 
@@ -212,10 +209,11 @@ impl FeaturePool {
             pixels_per_radian,
             plan: number,
         });
+        let (corner, step) = tree.corner_and_step(TileId::new(tree.finest(), 0, 0));
         let source = match &group.shape {
             Some(shape) => Source::Shape(Arc::clone(shape)),
             None => Source::Parts(Box::new(ShapeParts {
-                place: cut_place(candidate.group.cut, tree, self.unit),
+                place: CutPlace::new(candidate.group.cut, corner, step, self.unit),
                 group: candidate.group.clone(),
                 tiles: candidate
                     .tiles
@@ -434,18 +432,6 @@ fn candidates<'a>(
         }
     }
     found
-}
-
-fn cut_place(cut: [u32; 4], tree: &Tree, unit: f64) -> CutPlace {
-    let first = TileId::new(tree.finest(), 0, 0);
-    let ([x, y], step) = tree.corner_and_step(first);
-    let [row, column] = [cut[0], cut[1]].map(|patch| f64::from(patch * QUAD_SAMPLES));
-    CutPlace {
-        cut,
-        corner: [x + column * step[0], y + row * step[1]],
-        step,
-        unit,
-    }
 }
 
 /// The bits of a tile's patches that features stand in for; none where there is no feature.

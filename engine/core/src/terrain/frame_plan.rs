@@ -6,7 +6,10 @@ use super::frame::point;
 use crate::{
     geo::TileId,
     pyramid::Tile,
-    reference::shared::{DrawnTile, Frame, TILE_VISIBLE, refine::RefineTables},
+    reference::{
+        refine::RefineTables,
+        shared::{DrawnTile, Frame, TILE_VISIBLE},
+    },
     stream::{Bounds, View},
 };
 
@@ -53,7 +56,7 @@ pub struct FeatureDraw {
 pub struct ColorUpload {
     /// Layer of the colour pool.
     pub layer: u32,
-    /// 256 × 256 RGBA and smaller versions, as [`picture`](crate::stream::picture) makes them.
+    /// 256 × 256 RGBA and all mip levels, as [`mip_chain`](crate::stream::mip_chain) makes them.
     pub texels: Arc<[u8]>,
 }
 

@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use super::*;
 use crate::{
-    geo::{TILE_QUADS, TileId},
+    geo::TileId,
     pyramid::feature::FeatureGroup,
-    reference::shared::TILE_CUT,
+    reference::shared::{TILE_CUT, border::TILE_QUADS},
     stream::synthetic::Synthetic,
     terrain::feature_mesh::synthetic,
 };
@@ -22,7 +22,7 @@ fn with_arches(seed: u64, count: u32) -> Synthetic {
     let finest = source.metadata().finest();
     let [row0, column0, row1, column1] = synthetic::arch_place(1.0, 1.0 / 16.0).cut;
     for row in 0..count {
-        let down = row * TILE_QUADS as u32;
+        let down = row * TILE_QUADS;
         let tiles = [0, 1].map(|column| TileId::new(finest, row, column));
         source.features.push(FeatureGroup {
             id: row,

@@ -6,9 +6,9 @@ use crate::{
     cage::{Cage, NONE, Topology, refine},
     fas::{DepthRule, Features, Place, Tables},
     pyramid::PyramidError,
-    reference::shared::{
-        border::{QUAD_SAMPLES, TILE_CELLS},
+    reference::{
         refine::RefineGround,
+        shared::border::{QUAD_SAMPLES, TILE_CELLS},
     },
     stream::Bounds,
 };
@@ -27,6 +27,22 @@ pub struct CutPlace {
 }
 
 impl CutPlace {
+    /// The cut of a data set whose first finest sample is at a world x and y, `corner`.
+    pub(in crate::terrain) fn new(
+        cut: [u32; 4],
+        corner: [f64; 2],
+        step: [f64; 2],
+        unit: f64,
+    ) -> Self {
+        let first = [cut[1], cut[0]].map(|patch| f64::from(patch * QUAD_SAMPLES));
+        Self {
+            cut,
+            corner: [0, 1].map(|axis| corner[axis] + first[axis] * step[axis]),
+            step,
+            unit,
+        }
+    }
+
     /// Samples from west to east and from north to south.
     #[must_use]
     pub fn size(&self) -> [u32; 2] {
