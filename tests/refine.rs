@@ -7,11 +7,8 @@ use drumlin_core::{
     cage::{Cage, CageBudget, read_obj},
     fas::{PieceIndex, RenderTable, Tables},
     reference::{
-        refine,
-        shared::{
-            FeatureVertex,
-            refine::{RefineGround, RefineSite, RefineTables},
-        },
+        refine::{self, RefineGround, RefineSite, RefineTables},
+        shared::FeatureVertex,
     },
 };
 use glam::{DVec3, Vec3};
@@ -40,19 +37,21 @@ struct Exact {
     /// Splits of the face after which the place lies in a bicubic patch; none at a vertex.
     level: Option<u8>,
     position: DVec3,
-    normal: DVec3,
+    /// None where there is no tangent plane.
+    normal: Option<DVec3>,
 }
 
 fn exact(text: &str) -> Vec<Exact> {
     let row = |line: &str| {
         let cells: Vec<_> = line.split(',').collect();
-        let number = |cell: usize| cells[cell].parse::<f64>().unwrap_or(0.0);
+        let number = |cell: usize| cells[cell].parse::<f64>().expect("a number");
+        let vector = |cell: usize| DVec3::new(number(cell), number(cell + 1), number(cell + 2));
         Exact {
             face: cells[1].parse().expect("a face"),
             uv: [number(2), number(3)],
             level: cells[5].parse().ok(),
-            position: DVec3::new(number(6), number(7), number(8)),
-            normal: DVec3::new(number(15), number(16), number(17)),
+            position: vector(6),
+            normal: (!cells[15].is_empty()).then(|| vector(15)),
         }
     };
     text.lines().skip(1).map(row).collect()
@@ -143,6 +142,10 @@ fn execute(gpu: &Headless, tables: &RefineTables) -> (Vec<[f32; 3]>, Vec<Feature
     )
 }
 
+/// Radians by which f32 turns a normal: tangents are differences of points that lie 2^-DEPTH of a face apart, where a
+/// coordinate is rounded by 6e-8 of the extent; on faces of a hundredth of it that is 2e-4, and a few roundings meet.
+const TURNED: f32 = 1e-3;
+
 /// Both compute in f32, in the same order but for what a compiler fuses: a few last bits of the extent.
 fn assert_alike(
     name: &str,
@@ -167,7 +170,7 @@ fn assert_alike(
             "{name}: {found:?} {wanted:?}"
         );
         let turned = Vec3::from(found.normal).distance(wanted.normal.into());
-        assert!(turned <= 1e-3, "{name}: {found:?} {wanted:?}");
+        assert!(turned <= TURNED, "{name}: {found:?} {wanted:?}");
         assert_eq!(
             (found.tile, found.position_of),
             (wanted.tile, wanted.position_of)
@@ -176,7 +179,7 @@ fn assert_alike(
     vertices
 }
 
-/// The issue's own bounds: 1e-6 of the extent, 1e-3 rad.
+/// Points are sums of some tens of f32 terms, each rounded by 6e-8 of the extent: within 1e-6 of it.
 #[test]
 fn cages_are_refined_on_the_device_to_their_exact_limit() {
     let Some(gpu) = drumlin_tests::gpu() else {
@@ -208,16 +211,17 @@ fn cages_are_refined_on_the_device_to_their_exact_limit() {
             .collect();
         let packed = RefineTables::new(&tables, cage.positions(), &GROUND, &sites);
         let vertices = assert_alike(name, cage.extent(), &packed, &gpu);
-        let [mut far, mut turned] = [0.0_f64; 2];
+        let ([mut far, mut turned], mut normals) = ([0.0_f64; 2], 0);
         for ((sample, _), vertex) in held.iter().zip(&vertices) {
             let distance = Vec3::from(vertex.position)
                 .as_dvec3()
                 .distance(sample.position);
             far = far.max(distance / cage.extent());
-            if sample.normal != DVec3::ZERO {
-                let normal = Vec3::from(vertex.normal).as_dvec3();
-                let angle = normal.cross(sample.normal).length();
-                turned = turned.max(angle);
+            let normal = Vec3::from(vertex.normal).as_dvec3();
+            assert!((normal.length() - 1.0).abs() < 1e-5, "{name}: {normal}");
+            if let Some(exact) = sample.normal {
+                turned = turned.max(normal.angle_between(exact));
+                normals += 1;
             }
         }
         println!(
@@ -226,6 +230,10 @@ fn cages_are_refined_on_the_device_to_their_exact_limit() {
             samples.len()
         );
         assert!(held.len() * 2 > samples.len(), "{name}: {}", held.len());
-        assert!(far <= 1e-6 && turned <= 1e-3, "{name}: {far} {turned}");
+        assert!(normals * 10 > held.len() * 9, "{name}: {normals}");
+        assert!(
+            far <= 1e-6 && turned <= f64::from(TURNED),
+            "{name}: {far} {turned}"
+        );
     }
 }

@@ -110,7 +110,7 @@ fn spread_of(position: vec3f, per_metre: vec2f) -> Spread {
     return Spread(dpdx(position.xy), dpdy(position.xy), per_metre);
 }
 
-// Colour weighed by alpha, and alpha: 0 where there is no picture. Where a pixel covers more texels in one direction than
+// Colour with premultiplied alpha, and alpha: 0 where there is no picture. Where a pixel covers more texels in one direction than
 // across it, the mean of up to MOST_TAPS in a row, each as wide as the pixel is across (samplers do this too, but not all
 // of them rightly).
 fn imagery(here: Place, spread: Spread) -> vec4f {
@@ -124,13 +124,13 @@ fn imagery(here: Place, spread: Spread) -> vec4f {
     let long = length(along);
     let wide = abs(right.x * down.y - right.y * down.x) / max(long, 1.0e-9);
     let taps = clamp(ceil(long / max(wide, 1.0 / COLOR_TEXELS)), 1.0, MOST_TAPS);
-    let version = log2(max(long / taps * COLOR_TEXELS, 1.0));
+    let mip_level = log2(max(long / taps * COLOR_TEXELS, 1.0));
     let share = here.at / f32(TILE_CELLS) * scale + tiles[here.tile].color_offset;
     let middle = (share * (COLOR_TEXELS - 1.0) + 0.5) / COLOR_TEXELS;
     var sum = vec4f(0.0);
     for (var tap = 0.5; tap < taps; tap += 1.0) {
         let texel = middle + (tap / taps - 0.5) * along;
-        sum += textureSampleLevel(color_layers, color_sampler, texel, tiles[here.tile].color_slot, version);
+        sum += textureSampleLevel(color_layers, color_sampler, texel, tiles[here.tile].color_slot, mip_level);
     }
     return sum / taps;
 }

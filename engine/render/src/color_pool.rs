@@ -6,8 +6,8 @@ use drumlin_core::{
 };
 
 const SIDE: u32 = 256;
-/// A layer and its smaller versions: 256², 128², … 1.
-const VERSIONS: u32 = SIDE.ilog2() + 1;
+/// Mip levels: 256², 128², … 1.
+const MIP_COUNT: u32 = SIDE.ilog2() + 1;
 
 /// Layers of imagery, and how they are sampled.
 pub(crate) struct ColorPool {
@@ -26,7 +26,7 @@ impl ColorPool {
                 height: SIDE,
                 depth_or_array_layers: layers.clamp(1, PoolSizes::MAX_COLOR_LAYERS),
             },
-            mip_level_count: VERSIONS,
+            mip_level_count: MIP_COUNT,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
             format: wgpu::TextureFormat::Rgba8UnormSrgb,
@@ -58,17 +58,17 @@ impl ColorPool {
             return;
         }
         let mut offset = 0;
-        for version in 0..VERSIONS {
-            self.write(queue, upload, version, offset);
-            offset += u64::from(SIDE >> version).pow(2) * 4;
+        for mip_level in 0..MIP_COUNT {
+            self.write(queue, upload, mip_level, offset);
+            offset += u64::from(SIDE >> mip_level).pow(2) * 4;
         }
     }
 
-    /// Puts one version, whose texels begin at `offset`, into its layer.
-    fn write(&self, queue: &wgpu::Queue, upload: &ColorUpload, version: u32, offset: u64) {
-        let side = SIDE >> version;
+    /// Puts one mip level, whose texels begin at `offset`, into its layer.
+    fn write(&self, queue: &wgpu::Queue, upload: &ColorUpload, mip_level: u32, offset: u64) {
+        let side = SIDE >> mip_level;
         let target = wgpu::TexelCopyTextureInfo {
-            mip_level: version,
+            mip_level,
             origin: wgpu::Origin3d {
                 z: upload.layer,
                 ..wgpu::Origin3d::ZERO

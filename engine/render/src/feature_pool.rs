@@ -31,6 +31,8 @@ pub(crate) struct FeaturePool {
     drawn: Vec<u32>,
     /// Tables that this frame executes.
     arrived: Vec<RefineBuffers>,
+    /// A place on its way up.
+    words: Vec<u32>,
 }
 
 impl FeaturePool {
@@ -41,6 +43,7 @@ impl FeaturePool {
             meshes: BTreeMap::new(),
             drawn: Vec::new(),
             arrived: Vec::new(),
+            words: Vec::new(),
         }
     }
 
@@ -65,7 +68,8 @@ impl FeaturePool {
         self.drawn.clear();
         for draw in &plan.features {
             if let Some(mesh) = self.meshes.get_mut(&draw.feature) {
-                mesh.place(device, queue, &self.layout, draw);
+                mesh.place(device, &self.layout, draw);
+                mesh.write_place(queue, draw, &mut self.words);
                 self.drawn.push(draw.feature);
             }
         }
@@ -98,24 +102,23 @@ impl FeaturePool {
 }
 
 impl FeatureBuffers {
-    fn place(
-        &mut self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        layout: &wgpu::BindGroupLayout,
-        draw: &FeatureDraw,
-    ) {
+    /// Makes room for where it is drawn.
+    fn place(&mut self, device: &wgpu::Device, layout: &wgpu::BindGroupLayout, draw: &FeatureDraw) {
         let size = PLACE_BYTES + (4 * draw.tiles.len().max(1) as u64).next_multiple_of(PLACE_BYTES);
         if self.place.as_ref().is_none_or(|place| place.size() < size) {
             let place = buffer(device, size, wgpu::BufferUsages::STORAGE);
             self.bindings = Some(bind(device, layout, &self.vertices, &place));
             self.place = Some(place);
         }
-        let mut words: Vec<u32> = draw.origin.iter().map(|part| part.to_bits()).collect();
+    }
+
+    fn write_place(&self, queue: &wgpu::Queue, draw: &FeatureDraw, words: &mut Vec<u32>) {
+        words.clear();
+        words.extend(draw.origin.iter().map(|part| part.to_bits()));
         words.push(0);
         words.extend_from_slice(&draw.tiles);
         if let Some(place) = &self.place {
-            queue.write_buffer(place, 0, bytemuck::cast_slice(&words));
+            queue.write_buffer(place, 0, bytemuck::cast_slice(words));
         }
     }
 }

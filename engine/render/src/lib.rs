@@ -1,7 +1,7 @@
 //! Large-terrain streaming for wgpu: pyramids of any size, refined patch by patch, with exact seams.
 //!
 //! The application brings the device, the queue, the encoder and the render pass; a [`Terrain`] streams a pyramid,
-//! keeps its budgets and draws with one indirect draw. It needs WebGPU's default limits and no optional feature.
+//! keeps its budgets and draws with one indirect draw, and one draw a feature. It needs WebGPU's default limits and no optional feature.
 //!
 //! ```no_run
 //! use drumlin::{Headless, Offscreen, Terrain, TerrainDescriptor, View, wgpu};

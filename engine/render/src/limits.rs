@@ -10,6 +10,8 @@ const INVOCATIONS: u32 = 256;
 const WORKGROUP_BYTES: u32 = 16 << 10;
 /// Frame, tiles, the stage's own.
 const BIND_GROUPS: u32 = 3;
+/// Bytes of the largest buffer bound at once: a page of the pool, a feature's tables.
+const BINDING_BYTES: u64 = 128 << 20;
 /// Texels a side of a colour tile.
 const TEXTURE_SIDE: u32 = 256;
 
@@ -42,20 +44,32 @@ pub fn check_limits(limits: &wgpu::Limits) -> Result<(), RenderError> {
         ),
         ("maxBindGroups", BIND_GROUPS, limits.max_bind_groups),
         (
+            "maxDynamicUniformBuffersPerPipelineLayout",
+            1,
+            limits.max_dynamic_uniform_buffers_per_pipeline_layout,
+        ),
+        (
             "maxTextureDimension2D",
             TEXTURE_SIDE,
             limits.max_texture_dimension_2d,
         ),
     ];
-    match wanted
-        .into_iter()
-        .find(|&(_, needed, found)| found < needed)
-    {
+    let wanted = wanted.map(|(limit, needed, found)| (limit, u64::from(needed), u64::from(found)));
+    let bytes = [
+        (
+            "maxStorageBufferBindingSize",
+            BINDING_BYTES,
+            limits.max_storage_buffer_binding_size,
+        ),
+        ("maxBufferSize", BINDING_BYTES, limits.max_buffer_size),
+    ];
+    let mut wanted = wanted.into_iter().chain(bytes);
+    match wanted.find(|&(_, needed, found)| found < needed) {
         None => Ok(()),
         Some((limit, needed, found)) => Err(RenderError::LimitTooSmall {
             limit,
-            needed: needed.into(),
-            found: found.into(),
+            needed,
+            found,
         }),
     }
 }

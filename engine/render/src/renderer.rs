@@ -1,8 +1,8 @@
 //! Frame plans become pictures: the half of a terrain that knows the device and no camera.
 //!
 //! A plan goes up (tiles, imagery, the view, the drawn list), the stages run in one compute pass, and one indirect draw
-//! puts the result into the caller's render pass. Nothing is made per frame but a pool page that is used for the first
-//! time; nothing is waited for. [`Terrain`](crate::Terrain) owns one; tests hand it plans of their own.
+//! for the ground and one draw a feature put the result into the caller's render pass. Buffers are made when a pool page is
+//! used for the first time and when a feature's mesh arrives, else never; nothing is waited for. [`Terrain`](crate::Terrain) owns one; tests hand it plans of their own.
 
 use drumlin_core::terrain::{FramePlan, PoolSizes, Upload};
 

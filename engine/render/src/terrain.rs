@@ -1,7 +1,7 @@
 //! A terrain in an application: the planner on one side, the renderer on the other.
 //!
 //! ```text
-//! update(view) → plan (another thread) ‖ prepare(encoder): uploads, stages → draw(pass): one indirect draw
+//! update(view) → plan (another thread) ‖ prepare(encoder): uploads, stages → draw(pass): one indirect draw, and one a feature
 //! ```
 //!
 //! Follows wgpu's middleware pattern: the caller owns the device, the queue, the encoder and the pass. Nothing waits,
@@ -42,7 +42,8 @@ pub enum Pace {
     /// Every frame makes its own plan, on the caller's thread; tiles still arrive when they arrive.
     Stepped,
     /// As stepped, and every frame waits until nothing is missing: for pictures and tests. What cannot be read eight times
-    /// in three seconds is gone without; [`FrameStats::given_up`] counts it.
+    /// within about four seconds is gone without, and so is a feature without a mesh; [`FrameStats::given_up`] and
+    /// [`FrameStats::features_refused`] count them.
     Complete,
 }
 
@@ -148,7 +149,7 @@ impl Terrain {
         };
         let planner = Planner::new(
             Arc::clone(&source),
-            planner_descriptor(&descriptor, source.metadata())?,
+            planner_descriptor(&descriptor, &*source)?,
         )?;
         let renderer = Renderer::new(
             device,
@@ -320,7 +321,7 @@ const WAITING_RETRY: Retry = Retry {
 
 fn planner_descriptor(
     descriptor: &TerrainDescriptor,
-    metadata: &Metadata,
+    source: &dyn TileSource,
 ) -> Result<PlannerDescriptor, RenderError> {
     let (usual, wait_for_tiles) = (
         PlannerDescriptor::default(),
@@ -330,7 +331,8 @@ fn planner_descriptor(
         ram_budget_bytes: descriptor.ram_budget_bytes,
         vram_budget_bytes: vram::planner_budget(
             descriptor.vram_budget_bytes,
-            metadata.color.is_some(),
+            source.metadata().color.is_some(),
+            source.has_features(),
         )?,
         loader_threads: descriptor.loader_threads.max(1),
         error_px: descriptor.error_px,

@@ -10,7 +10,7 @@ use drumlin_core::{
         refine_times, write_obj,
     },
     fas::{MAX_DEPTH, Tables},
-    reference::shared::refine::bytes_by_level,
+    reference::refine::bytes_by_level,
 };
 use drumlin_terminal::{outcome::Outcome, print, write};
 use serde_json::{Value, json};

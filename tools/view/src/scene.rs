@@ -99,7 +99,7 @@ impl Scene {
     ///
     /// # Errors
     /// Where every frame shall be complete and this one cannot be: a tile or its picture could not be read, time and
-    /// again.
+    /// again, or a feature has no mesh.
     pub(crate) fn update(&mut self, view: &View, debug: Debug) -> Result<(), PyramidError> {
         let Debug {
             wireframe,
@@ -115,7 +115,7 @@ impl Scene {
         self.view = Some(*view);
         self.report = self.terrain.update(view);
         let FrameReport { stats, errors, .. } = &self.report;
-        if self.is_complete && stats.given_up > 0 {
+        if self.is_complete && stats.given_up + stats.features_refused > 0 {
             return Err(PyramidError::Invalid {
                 path: self.pyramid.clone(),
                 what: format!("a frame must go without: {}", errors.join("; ")),

@@ -1,7 +1,7 @@
 //! Executing the subdivision table: positions of all points from the cage's.
 //!
-//! Gathers only, level by level and kind by kind, so that rows of one kind may run in any order; the twin of the GPU's
-//! points stage.
+//! Gathers only, level by level and kind by kind, so that rows of one kind may run in any order; the stage
+//! `refine` does the same in f32.
 
 use std::ops::Range;
 

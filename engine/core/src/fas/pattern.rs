@@ -1,7 +1,7 @@
 //! The same places on every patch: positions and derivatives, many places at once.
 //!
 //! Weights depend on the place and the kind of patch alone, so they are made once; a patch then costs sixteen
-//! multiply-adds an axis and place, eight places side by side ([`LaneWeights`]). This is what drawing on the CPU does.
+//! multiply-adds an axis and place, eight places side by side ([`LaneWeights`]). For drawing on the CPU; the terrain draws by the stage `refine`.
 
 use super::{
     Piece,

@@ -1,6 +1,6 @@
 //! Stored colours as linear light and back: means and mixtures are taken of light, never of stored values.
 //!
-//! Beside the builder, which makes coarser imagery, and the loader, which makes smaller versions of it. Knows one channel
+//! Beside the builder, which makes coarser imagery, and the loader, which makes mip levels of it. Knows one channel
 //! of eight bits at a time.
 
 use std::sync::LazyLock;

@@ -9,19 +9,23 @@
 //! Based on: M. Nießner, C. Loop, M. Meyer, T. DeRose, *Feature-adaptive GPU rendering of Catmull-Clark subdivision
 //! surfaces* (2012), section 4.
 
+mod pack;
+
 use glam::{Vec2, Vec3, Vec4};
+
+pub use self::pack::{LevelBytes, RefineGround, RefineSite, RefineTables, bytes_by_level};
 
 use super::shared::{
     FeatureVertex, NONE,
     border::TILE_CELLS,
     refine::{
         REFINE_MEANS, REFINE_RINGS, REFINE_STENCIL, REFINE_VERTEX_WORDS, REFINE_WEIGHTED_WORDS,
-        RefineHeader, RefineTables, RefineTask,
+        RefineHeader, RefineTask,
     },
 };
 
 /// Least square of the sine between du and dv: below it they say nothing of a plane.
-const LEAST_SINE_SQUARE: f32 = 1.0e-8;
+pub(crate) const LEAST_SINE_SQUARE: f32 = 1.0e-8;
 
 #[derive(Clone, Copy, Default)]
 struct Sample {

@@ -16,7 +16,7 @@ use std::{
 
 use crossbeam::channel::{Receiver, Sender, bounded};
 
-use super::{TileSource, picture};
+use super::{TileSource, mip_chain};
 use crate::{
     geo::TileId,
     pyramid::{PyramidError, Summary, Tile, feature::FeatureGroup},
@@ -39,7 +39,7 @@ pub enum Job {
 pub enum Loaded {
     /// A tile, and the features that stand in the place of some of its patches.
     Tile(Arc<Tile>, Arc<[FeatureGroup]>),
-    /// Imagery as [`picture`] makes it, or that there is none.
+    /// Imagery as [`mip_chain`] makes it, or that there is none.
     Color(Option<Arc<[u8]>>),
     /// An error, of a tile or of imagery.
     Failed(PyramidError),
@@ -213,7 +213,7 @@ fn read_color(source: &dyn TileSource, id: TileId) -> Result<Loaded, PyramidErro
     let Some(texels) = source.load_color(id)? else {
         return Ok(Loaded::Color(None));
     };
-    let picture = picture(&texels).ok_or_else(|| PyramidError::Tile {
+    let picture = mip_chain(&texels).ok_or_else(|| PyramidError::Tile {
         tile: id,
         what: format!("imagery of {} bytes and not 256 × 256 × 4", texels.len()),
     })?;

@@ -31,8 +31,8 @@ pub(crate) struct Synthetic {
     pub(crate) void: Option<fn(TileId, usize, usize) -> bool>,
     /// Reads so far.
     pub(crate) reads: AtomicU64,
-    /// A feature: its group, with its cage.
-    pub(crate) feature: Option<FeatureGroup>,
+    /// Features: their groups, with their cages.
+    pub(crate) features: Vec<FeatureGroup>,
 }
 
 impl Synthetic {
@@ -72,7 +72,7 @@ impl Synthetic {
             rough: false,
             void: None,
             reads: AtomicU64::new(0),
-            feature: None,
+            features: Vec::new(),
         }
     }
 
@@ -126,10 +126,7 @@ impl Synthetic {
             0.1 * random * f32::from(up).exp2()
         };
         let slack = 100 * i32::from(up);
-        let has_feature = self
-            .feature
-            .as_ref()
-            .is_some_and(|group| group.tiles.contains(&id));
+        let has_feature = self.features.iter().any(|group| group.tiles.contains(&id));
         Summary {
             min: 700 - slack,
             max: 900 + slack,
@@ -212,17 +209,17 @@ impl TileSource for Synthetic {
     }
 
     fn has_features(&self) -> bool {
-        self.feature.is_some()
+        !self.features.is_empty()
     }
 
     fn load_features(&self, id: TileId) -> Result<Vec<FeatureGroup>, PyramidError> {
-        let mut group = self.feature.clone();
-        if let Some(group) = group.as_mut().filter(|group| group.home != id) {
-            group.cage = None;
-        }
-        Ok(group
-            .filter(|group| group.tiles.contains(&id))
-            .into_iter()
+        let groups = self.features.iter();
+        let here = groups.filter(|group| group.tiles.contains(&id));
+        Ok(here
+            .map(|group| FeatureGroup {
+                cage: group.cage.clone().filter(|_| group.home == id),
+                ..group.clone()
+            })
             .collect())
     }
 

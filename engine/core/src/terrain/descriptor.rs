@@ -23,7 +23,7 @@ pub struct PlannerDescriptor {
     pub texel_px: f64,
     /// How much larger errors and texels may be outside the view, as a factor.
     pub outside: f64,
-    /// Bytes a plan uploads at most.
+    /// Bytes of tiles and pictures that a plan uploads at most; tables of features go up beside them, one feature's a plan.
     pub upload_budget_bytes: u64,
     /// A plan waits until nothing is missing, and then uploads all that is new whatever the upload budget; for pictures
     /// and tests.
@@ -59,10 +59,14 @@ impl Default for PlannerDescriptor {
 }
 
 impl PlannerDescriptor {
-    /// One part in so many of both budgets is for features, where the data set has any.
-    pub const FEATURE_SHARE: u64 = 8;
     /// The least RAM budget, in tiles, beside what is set aside for reads under way.
     pub const MIN_RAM_TILES: u64 = 64;
+
+    /// What of either budget is for features, where the data set has any: an eighth.
+    #[must_use]
+    pub const fn feature_share(budget_bytes: u64) -> u64 {
+        budget_bytes / 8
+    }
 
     /// Pictures that may be under way or wait for a layer: a quarter of RAM at most.
     pub(super) fn color_limit(&self, pool: &PoolSizes) -> usize {

@@ -6,7 +6,8 @@
 //!
 //! A feature is drawn when all its tiles are drawn at the finest level and its mesh is up; and, as a tile's cut bits speak
 //! of all its features, when all features of its tiles are so too. Otherwise its ground is drawn. Meshes are made on a
-//! thread of their own, and count in shares of the RAM and VRAM budgets; one that does not fit is not drawn.
+//! thread of their own, the nearest first, and count in shares of the RAM and VRAM budgets; where not all fit, the farthest
+//! are not drawn until they do.
 
 use std::{
     collections::{BTreeMap, HashMap},
@@ -22,11 +23,8 @@ use super::{
 use crate::{
     geo::TileId,
     pyramid::{PyramidError, Tile, feature::FeatureGroup},
-    reference::shared::{
-        TILE_CUT,
-        border::{QUAD_SAMPLES, TILE_QUADS},
-    },
-    stream::{Drawn, Tree, View},
+    reference::shared::{TILE_CUT, border::TILE_QUADS},
+    stream::{Bounds, Drawn, Tree, View},
 };
 
 /// Share of a feature's distance that the eye moves before its depths are chosen anew.
@@ -51,20 +49,41 @@ struct Group {
     is_up: bool,
     /// This mesh is in no plan yet.
     is_new: bool,
-    /// It cannot be meshed, or does not fit.
-    is_refused: bool,
-    /// View of the last job: the eye and pixels per radian.
-    seen: Option<([f64; 3], f64)>,
+    refusal: Option<Refusal>,
+    /// The view of the last job.
+    seen: Option<Seen>,
     /// Last plan whose drawn cut held all its tiles.
     used: u64,
 }
 
-/// A group all of whose tiles are drawn at the finest level.
-struct Candidate {
-    group: FeatureGroup,
-    drawn: Vec<u32>,
-    tiles: Vec<Arc<Tile>>,
+/// Why a feature has no mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Refusal {
+    /// It cannot be meshed.
+    Broken,
+    /// Its mesh took so many bytes, in VRAM and in RAM, and did not fit beside nearer ones.
+    TooLarge([u64; 2]),
 }
+
+/// What a mesh was made for.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    eye: [f64; 3],
+    pixels_per_radian: f64,
+    /// The plan that asked for it.
+    plan: u64,
+}
+
+/// A group all of whose tiles are drawn at the finest level.
+struct Candidate<'a> {
+    group: &'a FeatureGroup,
+    drawn: Vec<u32>,
+    tiles: Vec<&'a Arc<Tile>>,
+    /// Metres from the eye to the nearest of its tiles' boxes.
+    distance: f64,
+}
+
+type Candidates<'a> = BTreeMap<u32, Candidate<'a>>;
 
 impl FeaturePool {
     pub(super) fn new(ram_budget: u64, vram_budget: u64, unit: f64) -> Result<Self, PyramidError> {
@@ -92,16 +111,15 @@ impl FeaturePool {
 
     /// Bytes in VRAM and in RAM.
     pub(super) fn byte_counts(&self) -> [u64; 2] {
-        let (mut vram, mut ram) = (0, 0);
-        for group in self.groups.values() {
-            let mesh = group.mesh.as_ref().map_or([0; 2], ReadyMesh::byte_counts);
-            vram += if group.is_up { mesh[0] } else { 0 };
-            ram += mesh[1] + group.shape.as_ref().map_or(0, |shape| shape.byte_count());
-        }
-        [vram, ram]
+        let groups = self.groups.values().map(|group| {
+            let [vram, ram] = group.byte_counts();
+            [if group.is_up { vram } else { 0 }, ram]
+        });
+        groups.fold([0; 2], |sum, own| [0, 1].map(|of| sum[of] + own[of]))
     }
 
-    /// Puts into a plan what its features need; when the plan is to wait, meshes are waited for.
+    /// Puts into a plan what its features need; when the plan is to wait, meshes are waited for. Returns the bytes that go
+    /// up, and how many features could be drawn but for a refusal.
     pub(super) fn plan(
         &mut self,
         plan: &mut FramePlan,
@@ -109,20 +127,23 @@ impl FeaturePool {
         drawn: &Drawn,
         view: &View,
         (number, wait): (u64, bool),
-    ) {
-        let candidates = candidates(plan, tree, drawn);
-        for candidate in candidates.values() {
-            self.groups.entry(candidate.group.id).or_default().used = number;
+    ) -> (u64, usize) {
+        let candidates = candidates(plan, tree, drawn, view.eye);
+        for &id in candidates.keys() {
+            self.groups.entry(id).or_default().used = number;
         }
         self.receive(Duration::ZERO);
-        self.start_next(&candidates, tree, view);
+        self.retry(&candidates);
+        self.start_next(&candidates, tree, view, number);
         while wait && self.mesher.is_busy() {
             self.receive(Duration::from_secs(1));
-            self.start_next(&candidates, tree, view);
+            self.start_next(&candidates, tree, view, number);
         }
-        self.leave_unused(plan, number);
-        self.upload(plan, &candidates, wait);
+        self.keep_budget(plan, &candidates, number);
+        let bytes = self.upload(plan, &candidates, wait);
         self.draw(plan, tree, drawn, &candidates);
+        let is_refused = |id: &&u32| self.groups[id].refusal.is_some();
+        (bytes, candidates.keys().filter(is_refused).count())
     }
 
     fn receive(&mut self, wait: Duration) {
@@ -133,7 +154,7 @@ impl FeaturePool {
             return;
         };
         if let Some(error) = meshed.error {
-            group.is_refused = true;
+            group.refusal = Some(Refusal::Broken);
             self.errors.push(error);
             return;
         }
@@ -143,95 +164,122 @@ impl FeaturePool {
         }
     }
 
-    /// Gives the thread its next job: a feature without a mesh, or one from which the eye has moved.
-    fn start_next(&mut self, candidates: &BTreeMap<u32, Candidate>, tree: &Tree, view: &View) {
-        if self.mesher.is_busy() {
-            return;
-        }
-        let pixels_per_radian = view.pixels_per_radian();
-        for (id, candidate) in candidates {
-            let Some(group) = self.groups.get_mut(id) else {
+    /// What did not fit is tried again once it would, beside the candidates that are nearer.
+    fn retry(&mut self, candidates: &Candidates<'_>) {
+        let mut room = self.room();
+        for id in nearest_first(candidates) {
+            let Some(group) = self.groups.get_mut(&id) else {
                 continue;
             };
-            if group.is_refused || !is_due(group, view) {
-                continue;
+            let bytes = match group.refusal {
+                Some(Refusal::TooLarge(bytes)) => bytes,
+                _ => group.byte_counts(),
+            };
+            if room.take(bytes) && group.refusal != Some(Refusal::Broken) {
+                group.refusal = None;
             }
-            group.seen = Some((view.eye, pixels_per_radian));
-            let source = match &group.shape {
-                Some(shape) => Source::Shape(Arc::clone(shape)),
-                None => Source::Parts(Box::new(ShapeParts {
-                    place: cut_place(candidate.group.cut, tree, self.unit),
-                    group: candidate.group.clone(),
-                    tiles: candidate.tiles.clone(),
-                })),
-            };
-            let depths = group
-                .mesh
-                .as_ref()
-                .map_or_else(Arc::default, |mesh| Arc::clone(&mesh.depths));
-            self.mesher.start(Box::new(MeshJob {
-                feature: *id,
-                source,
-                eye: view.eye,
-                pixels_per_radian,
-                depths,
-            }));
-            return;
         }
     }
 
-    /// Forgets features that no drawn cut holds any more, as soon as there is no room for all.
-    fn leave_unused(&mut self, plan: &mut FramePlan, number: u64) {
-        let [vram, ram] = self.wanted_bytes();
-        if vram <= self.vram_budget && ram <= self.ram_budget {
+    /// Gives the thread its next job: the nearest feature without a mesh, or else, of those that the eye has moved from,
+    /// the one whose last job is the longest ago.
+    fn start_next(&mut self, candidates: &Candidates<'_>, tree: &Tree, view: &View, number: u64) {
+        if self.mesher.is_busy() {
+            return;
+        }
+        let due = nearest_first(candidates).into_iter().filter(|id| {
+            let group = &self.groups[id];
+            group.refusal.is_none() && is_due(group, view)
+        });
+        let last = |id: &u32| {
+            let group = &self.groups[id];
+            group.mesh.as_ref().and(group.seen).map(|seen| seen.plan)
+        };
+        // Of equal ones the first: the nearest.
+        let Some(id) = due.min_by_key(last) else {
+            return;
+        };
+        let candidate = &candidates[&id];
+        let pixels_per_radian = view.pixels_per_radian();
+        let Some(group) = self.groups.get_mut(&id) else {
+            return;
+        };
+        group.seen = Some(Seen {
+            eye: view.eye,
+            pixels_per_radian,
+            plan: number,
+        });
+        let (corner, step) = tree.corner_and_step(TileId::new(tree.finest(), 0, 0));
+        let source = match &group.shape {
+            Some(shape) => Source::Shape(Arc::clone(shape)),
+            None => Source::Parts(Box::new(ShapeParts {
+                place: CutPlace::new(candidate.group.cut, corner, step, self.unit),
+                group: candidate.group.clone(),
+                tiles: candidate
+                    .tiles
+                    .iter()
+                    .map(|&tile| Arc::clone(tile))
+                    .collect(),
+            })),
+        };
+        let depths = group
+            .mesh
+            .as_ref()
+            .map_or_else(Arc::default, |mesh| Arc::clone(&mesh.depths));
+        self.mesher.start(Box::new(MeshJob {
+            feature: id,
+            source,
+            eye: view.eye,
+            pixels_per_radian,
+            depths,
+        }));
+    }
+
+    /// As soon as there is no room for all: forgets features that no drawn cut holds any more, then leaves out
+    /// those that do not fit beside nearer ones.
+    fn keep_budget(&mut self, plan: &mut FramePlan, candidates: &Candidates<'_>, number: u64) {
+        let mut room = self.room();
+        if self
+            .groups
+            .values()
+            .all(|group| room.take(group.byte_counts()))
+        {
             return;
         }
         self.groups.retain(|&id, group| {
-            let stays = group.used == number || group.is_refused;
+            let stays = group.used == number || group.refusal == Some(Refusal::Broken);
             if !stays && group.is_up {
                 plan.feature_frees.push(id);
             }
             stays
         });
-        // Still too much: the last ones are not drawn.
-        while let Some((&id, group)) = self
-            .groups
-            .iter_mut()
-            .rev()
-            .find(|(_, group)| group.mesh.is_some())
-        {
-            let mesh = group.mesh.take();
-            let freed = std::mem::take(&mut group.is_up);
-            let [vram, ram] = self.wanted_bytes();
-            let own = mesh.as_ref().map_or([0; 2], ReadyMesh::byte_counts);
-            if vram + own[0] <= self.vram_budget && ram + own[1] <= self.ram_budget {
-                if let Some(group) = self.groups.get_mut(&id) {
-                    (group.mesh, group.is_up) = (mesh, freed);
-                }
-                return;
+        let mut room = self.room();
+        for id in nearest_first(candidates) {
+            let Some(group) = self.groups.get_mut(&id) else {
+                continue;
+            };
+            let bytes = group.byte_counts();
+            if room.take(bytes) {
+                continue;
             }
-            if let Some(group) = self.groups.get_mut(&id) {
-                (group.shape, group.is_refused) = (None, true);
-            }
-            if freed {
+            if std::mem::take(&mut group.is_up) {
                 plan.feature_frees.push(id);
             }
+            (group.mesh, group.shape, group.is_new) = (None, None, false);
+            group.refusal = Some(Refusal::TooLarge(bytes));
             self.errors.push(format!(
                 "feature {id}: its mesh does not fit the budget; its ground is drawn"
             ));
         }
     }
 
-    fn wanted_bytes(&self) -> [u64; 2] {
-        let meshes = self.groups.values().filter_map(|group| group.mesh.as_ref());
-        [
-            meshes.map(|mesh| mesh.byte_counts()[0]).sum(),
-            self.byte_counts()[1],
-        ]
+    fn room(&self) -> Room {
+        Room([self.vram_budget, self.ram_budget])
     }
 
-    /// One mesh a plan; all of them when the plan waits.
-    fn upload(&mut self, plan: &mut FramePlan, candidates: &BTreeMap<u32, Candidate>, wait: bool) {
+    /// One mesh a plan, however large; all of them when the plan waits. Returns the bytes that go up.
+    fn upload(&mut self, plan: &mut FramePlan, candidates: &Candidates<'_>, wait: bool) -> u64 {
+        let mut bytes = 0;
         for id in candidates.keys() {
             let Some(group) = self.groups.get_mut(id).filter(|group| group.is_new) else {
                 continue;
@@ -242,31 +290,27 @@ impl FeaturePool {
                     tables: Arc::clone(&mesh.tables),
                     indices: Arc::clone(&mesh.indices),
                 });
+                bytes += mesh.byte_counts()[1];
                 (group.is_up, group.is_new) = (true, false);
                 if !wait {
-                    return;
+                    break;
                 }
             }
         }
+        bytes
     }
 
     /// Draws what can be drawn, and marks its tiles.
-    fn draw(
-        &self,
-        plan: &mut FramePlan,
-        tree: &Tree,
-        drawn: &Drawn,
-        candidates: &BTreeMap<u32, Candidate>,
-    ) {
+    fn draw(&self, plan: &mut FramePlan, tree: &Tree, drawn: &Drawn, candidates: &Candidates<'_>) {
         let is_up = |id: &u32| self.groups.get(id).is_some_and(|group| group.is_up);
-        let mut chosen: BTreeMap<u32, &Candidate> = candidates
+        let mut chosen: BTreeMap<u32, &Candidate<'_>> = candidates
             .iter()
             .filter(|(id, _)| is_up(id))
             .map(|(&id, candidate)| (id, candidate))
             .collect();
         // A tile with one feature that is not drawn keeps its ground, and so do its other features.
         loop {
-            let complete = |candidate: &&Candidate| {
+            let complete = |candidate: &&Candidate<'_>| {
                 candidate.drawn.iter().all(|&tile| {
                     let node = tree.node(drawn.leaves[tile as usize].node);
                     node.features
@@ -301,23 +345,56 @@ impl FeaturePool {
     }
 }
 
+/// Bytes that are left, in VRAM and in RAM.
+struct Room([u64; 2]);
+
+impl Room {
+    /// Takes bytes, unless there are too few left.
+    fn take(&mut self, bytes: [u64; 2]) -> bool {
+        let fits = (0..2).all(|of| bytes[of] <= self.0[of]);
+        if fits {
+            self.0 = [0, 1].map(|of| self.0[of] - bytes[of]);
+        }
+        fits
+    }
+}
+
+impl Group {
+    /// Bytes of its mesh in VRAM, and of the mesh and its shape in RAM.
+    fn byte_counts(&self) -> [u64; 2] {
+        let [vram, ram] = self.mesh.as_ref().map_or([0; 2], ReadyMesh::byte_counts);
+        [
+            vram,
+            ram + self.shape.as_ref().map_or(0, |shape| shape.byte_count()),
+        ]
+    }
+}
+
+/// True without a mesh, and when the eye has moved so far, seen from the feature, that its depths may be others.
 fn is_due(group: &Group, view: &View) -> bool {
-    let Some((eye, pixels_per_radian)) = group.seen else {
+    let (Some(seen), Some(shape), Some(_)) = (group.seen, &group.shape, &group.mesh) else {
         return true;
     };
-    let distance = |a: [f64; 3], b: [f64; 3]| {
-        (0..3)
-            .map(|axis| (a[axis] - b[axis]).powi(2))
-            .sum::<f64>()
-            .sqrt()
-    };
-    let origin = group.shape.as_ref().map_or(eye, |shape| shape.origin());
-    let has_moved = distance(eye, view.eye) > MOVED * distance(origin, view.eye);
-    group.mesh.is_none() || has_moved || (view.pixels_per_radian() - pixels_per_radian).abs() > 1e-9
+    let step = [0, 1, 2].map(|axis| view.eye[axis] - seen.eye[axis]);
+    let moved = step.iter().map(|part| part * part).sum::<f64>().sqrt();
+    let distance = shape.bounds().distance(view.eye).max(view.near);
+    moved > MOVED * distance || (view.pixels_per_radian() - seen.pixels_per_radian).abs() > 1e-9
+}
+
+/// Numbers of candidates, by distance from the eye.
+fn nearest_first(candidates: &Candidates<'_>) -> Vec<u32> {
+    let mut ids: Vec<u32> = candidates.keys().copied().collect();
+    ids.sort_by(|a, b| candidates[a].distance.total_cmp(&candidates[b].distance));
+    ids
 }
 
 /// The groups all of whose tiles are drawn at the finest level, by number.
-fn candidates(plan: &FramePlan, tree: &Tree, drawn: &Drawn) -> BTreeMap<u32, Candidate> {
+fn candidates<'a>(
+    plan: &FramePlan,
+    tree: &'a Tree,
+    drawn: &Drawn,
+    eye: [f64; 3],
+) -> Candidates<'a> {
     let mut found = BTreeMap::new();
     let homes = drawn.leaves.iter().flat_map(|leaf| {
         let features = &tree.node(leaf.node).features;
@@ -337,12 +414,17 @@ fn candidates(plan: &FramePlan, tree: &Tree, drawn: &Drawn) -> BTreeMap<u32, Can
         let all = group.tiles.iter().map(|id| {
             let &at = places.get(id)?;
             let tile = tree.node(drawn.leaves[at as usize].node).tile()?;
-            Some((at, Arc::clone(tile)))
+            Some((at, tile))
         });
         if let Some(all) = all.collect::<Option<Vec<_>>>() {
-            let (drawn, tiles) = all.into_iter().unzip();
+            let (drawn, tiles): (Vec<u32>, _) = all.into_iter().unzip();
+            let distances = drawn.iter().map(|&at| {
+                let bounds: Bounds = plan.places[at as usize].bounds;
+                bounds.distance(eye)
+            });
             let candidate = Candidate {
-                group: group.clone(),
+                group,
+                distance: distances.fold(f64::INFINITY, f64::min),
                 drawn,
                 tiles,
             };
@@ -350,18 +432,6 @@ fn candidates(plan: &FramePlan, tree: &Tree, drawn: &Drawn) -> BTreeMap<u32, Can
         }
     }
     found
-}
-
-fn cut_place(cut: [u32; 4], tree: &Tree, unit: f64) -> CutPlace {
-    let first = TileId::new(tree.finest(), 0, 0);
-    let ([x, y], step) = tree.corner_and_step(first);
-    let [row, column] = [cut[0], cut[1]].map(|patch| f64::from(patch * QUAD_SAMPLES));
-    CutPlace {
-        cut,
-        corner: [x + column * step[0], y + row * step[1]],
-        step,
-        unit,
-    }
 }
 
 /// The bits of a tile's patches that features stand in for; none where there is no feature.

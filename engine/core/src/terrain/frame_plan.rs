@@ -6,7 +6,10 @@ use super::frame::point;
 use crate::{
     geo::TileId,
     pyramid::Tile,
-    reference::shared::{DrawnTile, Frame, TILE_VISIBLE, refine::RefineTables},
+    reference::{
+        refine::RefineTables,
+        shared::{DrawnTile, Frame, TILE_VISIBLE},
+    },
     stream::{Bounds, View},
 };
 
@@ -53,7 +56,7 @@ pub struct FeatureDraw {
 pub struct ColorUpload {
     /// Layer of the colour pool.
     pub layer: u32,
-    /// 256 × 256 RGBA and smaller versions, as [`picture`](crate::stream::picture) makes them.
+    /// 256 × 256 RGBA and all mip levels, as [`mip_chain`](crate::stream::mip_chain) makes them.
     pub texels: Arc<[u8]>,
 }
 
@@ -68,7 +71,7 @@ pub struct Place {
     pub base: f64,
 }
 
-/// One frame: uploads first, then stages over the drawn list, then one indirect draw.
+/// One frame: uploads first, then stages over the drawn list, then one indirect draw for the ground and one a feature.
 #[derive(Clone, Debug, Default)]
 pub struct FramePlan {
     /// Tiles that arrived; at most the upload budget.

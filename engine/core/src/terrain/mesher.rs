@@ -17,7 +17,7 @@ use crate::{
     cage::Cage,
     geo::{TILE_SAMPLES, TileId},
     pyramid::{PyramidError, Tile, feature::FeatureGroup, surface},
-    reference::shared::{border::TILE_CELLS, refine::RefineTables},
+    reference::{refine::RefineTables, shared::border::TILE_CELLS},
 };
 
 /// What a shape is made from: the group, its cage, and its tiles in the group's order.
@@ -166,10 +166,12 @@ fn mesh(job: &MeshJob) -> Result<Meshed, String> {
     } else {
         let table = shape.table(&depths).map_err(|error| error.to_string())?;
         let (tables, indices) = table.packed(&shape);
-        let largest = tables.largest_buffer_bytes();
+        let largest = tables
+            .largest_buffer_bytes()
+            .max(size_of_val(&*indices) as u64);
         if largest > BUFFER_BYTES {
             return Err(format!(
-                "its tables need a buffer of {largest} bytes, above the limit of {BUFFER_BYTES}"
+                "its mesh needs a buffer of {largest} bytes, above the limit of {BUFFER_BYTES}"
             ));
         }
         Some(ReadyMesh {

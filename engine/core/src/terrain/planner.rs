@@ -155,18 +155,22 @@ impl Planner {
         let rule = self.choose_and_fetch(view);
         self.scheduler.cancel_stale(&mut self.tree, self.number);
         self.colors.drop_unwanted(&mut self.tree, self.number);
-        let uploaded_bytes = self.upload(plan);
+        let mut uploaded_bytes = self.upload(plan);
         self.drawn.find(&mut self.tree);
         list::fill(plan, &self.tree, &self.drawn, self.source.0.metadata());
         plan.ground = self.base.ground();
+        let mut features_refused = 0;
         if let Some(features) = &mut self.features {
             let how = (self.number, self.descriptor.wait_for_tiles);
-            features.plan(plan, &self.tree, &self.drawn, view, how);
+            let (bytes, refused) = features.plan(plan, &self.tree, &self.drawn, view, how);
+            uploaded_bytes += bytes;
+            features_refused = refused;
         }
         plan.frame = Some(self.base.frame(view, rule.tolerance, plan.drawn.len()));
         plan.aim(view);
         let mut stats = FrameStats {
             uploaded_bytes,
+            features_refused,
             tolerance_px: rule.tolerance,
             ..self.count(plan)
         };
@@ -462,14 +466,17 @@ fn set_features_aside(
     if !source.has_features() {
         return Ok((descriptor, None));
     }
-    let ram = descriptor.ram_budget_bytes / PlannerDescriptor::FEATURE_SHARE;
-    let vram = descriptor.vram_budget_bytes / PlannerDescriptor::FEATURE_SHARE;
+    let [ram, vram] = [descriptor.ram_budget_bytes, descriptor.vram_budget_bytes]
+        .map(PlannerDescriptor::feature_share);
     descriptor.ram_budget_bytes -= ram;
     descriptor.vram_budget_bytes -= vram;
     let pool = FeaturePool::new(ram, vram, source.metadata().unit())?;
     Ok((descriptor, Some(pool)))
 }
 
+#[cfg(test)]
+#[path = "planner_feature_tests.rs"]
+mod feature_tests;
 #[cfg(test)]
 #[path = "planner_tests.rs"]
 mod tests;

@@ -21,7 +21,8 @@ pub struct FrameStats {
     pub tolerance_px: f64,
     /// Bytes read from the store for all plans so far.
     pub bytes_read: u64,
-    /// Bytes this plan uploads.
+    /// Bytes this plan uploads: tiles and pictures within the upload budget, and the tables of one feature, however large
+    /// (of all new ones where the plan waits).
     pub uploaded_bytes: u64,
     /// Bytes of tiles and pictures in RAM, with what is set aside for those under way.
     pub ram_bytes: u64,
@@ -40,7 +41,10 @@ pub struct FrameStats {
     pub given_up: usize,
     /// Features drawn in place of the ground they were laid into.
     pub features_drawn: usize,
-    /// Bytes of features' meshes in GPU memory, and of them and what they are made from in RAM.
+    /// Features whose tiles are all drawn at the finest level, and whose ground is drawn because their mesh cannot be made
+    /// or does not fit the budgets.
+    pub features_refused: usize,
+    /// Bytes of features' meshes in GPU memory, with the tables they were made from there, and of both in RAM.
     pub feature_bytes: [u64; 2],
     /// Time the plan took, milliseconds.
     pub update_millis: f64,

@@ -21,7 +21,7 @@ use super::{
     tile_surface::{Collider, Plane, Spot, TileFrame, TileSurface},
 };
 use crate::{
-    geo::{Grid, QUAD_SAMPLES, TILE_CELLS, TileId, WorldFrame},
+    geo::{Grid, TILE_CELLS, TileId, WorldFrame},
     pyramid::{PyramidError, Summary, feature::FeatureGroup},
     stream::TileSource,
 };
@@ -207,15 +207,7 @@ impl Surface {
         let tiles = group.tiles.iter().map(|&id| self.tile(id));
         let tiles = tiles.collect::<Result<Vec<_>, _>>()?;
         let frame = self.tile_frame(TileId::new(self.finest(), 0, 0));
-        let at = |axis: usize, patch: u32| {
-            frame.corner[axis] + f64::from(patch) * QUAD_SAMPLES as f64 * frame.step[axis]
-        };
-        let place = CutPlace {
-            cut: group.cut,
-            corner: [at(0, group.cut[1]), at(1, group.cut[0])],
-            step: frame.step,
-            unit: frame.unit,
-        };
+        let place = CutPlace::new(group.cut, frame.corner, frame.step, frame.unit);
         let feature = FeatureSurface::new(cage, place, tiles.iter().map(|kept| &kept.tile))?;
         let feature = Arc::new(feature);
         features().put(group.id, Arc::clone(&feature));

@@ -228,7 +228,7 @@ fn with_arch_in(step: f64) -> Surface {
     let finest = source.metadata().finest();
     let place = synthetic::arch_place(1.0, 1.0 / 16.0);
     let tiles = vec![TileId::new(finest, 0, 0), TileId::new(finest, 0, 1)];
-    source.feature = Some(FeatureGroup {
+    source.features.push(FeatureGroup {
         id: 4,
         home: tiles[0],
         tiles,

@@ -2,9 +2,12 @@
 //!
 //! Belongs to no frame: a feature's tables are executed once, when they arrive.
 
-use drumlin_core::reference::shared::{
-    FeatureVertex,
-    refine::{REFINE_TASK_STRIDE, RefineHeader, RefineTables, RefineTask},
+use drumlin_core::reference::{
+    refine::RefineTables,
+    shared::{
+        FeatureVertex,
+        refine::{REFINE_TASK_STRIDE, RefineHeader, RefineTask},
+    },
 };
 
 use super::{Access, layout, module, pipeline, storage, uniform};

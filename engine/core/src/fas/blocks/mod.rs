@@ -15,7 +15,8 @@
 //! * Around what is semi-sharp there is no closed form while it is sharp: patches below level 1 there are those of
 //!   general tables, made anew when a depth on such a line changes.
 //!
-//! Knows topology and depths; knows no view and no device.
+//! For whoever moves depths often and evaluates on the CPU: benches, and applications. The terrain meshes its features with
+//! `Tables`, whose rows the stage `refine` executes. Knows topology and depths; knows no view and no device.
 //!
 //! Based on: Lin, Wang, Sun, *Improved feature-adaptive subdivision for Catmull-Clark surface model* (2018), section 2;
 //! H. Schäfer, J. Raab, B. Keinert, M. Meyer, M. Stamminger, M. Nießner, *Dynamic feature-adaptive subdivision* (2015).

@@ -1,10 +1,7 @@
 //! The stage against the f64 tables, on a cage with a boundary, a crease and an extraordinary vertex.
 
 use super::*;
-use crate::{
-    fas::{PieceIndex, Tables, testing::fan},
-    reference::shared::refine::{RefineGround, RefineSite},
-};
+use crate::fas::{PieceIndex, Tables, testing::fan};
 
 fn ground() -> RefineGround {
     RefineGround {
@@ -102,11 +99,12 @@ fn bytes_by_level_count_rows_gathers_and_points() {
     let cage = fan(0.0);
     let tables = Tables::classic(cage.topology(), 2).unwrap();
     let packed = RefineTables::new(&tables, cage.positions(), &ground(), &[]);
-    let rows: u64 = packed.levels.iter().map(|level| level.rows).sum();
+    let levels = bytes_by_level(&tables);
+    let rows: u64 = levels.iter().map(|level| level.rows).sum();
     assert_eq!(rows, 4 * packed.words.len() as u64);
-    let points: u64 = packed.levels.iter().map(|level| level.points).sum();
+    let points: u64 = levels.iter().map(|level| level.points).sum();
     assert_eq!(points, u64::from(tables.point_count() - tables.cage_points));
-    for (bytes, rows) in packed.levels[1..].iter().zip(&tables.levels) {
+    for (bytes, rows) in levels[1..].iter().zip(&tables.levels) {
         let quads = rows.faces.len() + rows.edges.len();
         let plain = 4 * quads + rows.vertex_points.len();
         assert!(bytes.gathered >= 12 * plain as u64);

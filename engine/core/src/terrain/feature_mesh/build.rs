@@ -17,7 +17,7 @@ use std::collections::HashMap;
 use super::{FeatureShape, FeatureTable};
 use crate::{
     fas::{PieceIndex, Place, Tables},
-    reference::shared::{NONE, refine::RefineSite},
+    reference::{refine::RefineSite, shared::NONE},
 };
 
 /// A face's side in the fixed steps that places are counted in: finer than any cell of the greatest depth.

@@ -6,10 +6,11 @@ use crate::{
     cage::{Cage, NONE, Topology, refine},
     fas::{DepthRule, Features, Place, Tables},
     pyramid::PyramidError,
-    reference::shared::{
-        border::{QUAD_SAMPLES, TILE_CELLS},
+    reference::{
         refine::RefineGround,
+        shared::border::{QUAD_SAMPLES, TILE_CELLS},
     },
+    stream::Bounds,
 };
 
 /// Where a cut lies.
@@ -26,6 +27,22 @@ pub struct CutPlace {
 }
 
 impl CutPlace {
+    /// The cut of a data set whose first finest sample is at a world x and y, `corner`.
+    pub(in crate::terrain) fn new(
+        cut: [u32; 4],
+        corner: [f64; 2],
+        step: [f64; 2],
+        unit: f64,
+    ) -> Self {
+        let first = [cut[1], cut[0]].map(|patch| f64::from(patch * QUAD_SAMPLES));
+        Self {
+            cut,
+            corner: [0, 1].map(|axis| corner[axis] + first[axis] * step[axis]),
+            step,
+            unit,
+        }
+    }
+
     /// Samples from west to east and from north to south.
     #[must_use]
     pub fn size(&self) -> [u32; 2] {
@@ -81,6 +98,8 @@ pub struct FeatureShape {
     /// Heights of the border's samples, by the place they are asked for, in units.
     pub(super) heights: Vec<i32>,
     pub(super) origin: [f64; 3],
+    /// Of its cage, in world metres.
+    bounds: Bounds,
 }
 
 impl FeatureShape {
@@ -122,9 +141,11 @@ impl FeatureShape {
                 place.corner[1],
                 f64::from(base) * place.unit,
             ],
+            bounds: Bounds::default(),
             cage,
             place,
         };
+        shape.bounds = shape.find_bounds();
         shape.find_offsets().map_err(refused)?;
         Ok(shape)
     }
@@ -133,6 +154,21 @@ impl FeatureShape {
     #[must_use]
     pub fn origin(&self) -> [f64; 3] {
         self.origin
+    }
+
+    /// Its box in world metres: that of its cage, whose hull holds the surface.
+    #[must_use]
+    pub fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    fn find_bounds(&self) -> Bounds {
+        let [min, max] = self.cage.bounds();
+        let world = |corner: [f64; 3]| [0, 1, 2].map(|axis| corner[axis] + self.origin[axis]);
+        Bounds {
+            min: world(min),
+            max: world(max),
+        }
     }
 
     /// Bytes in memory, about, for budgets.

@@ -6,10 +6,9 @@
 use super::{FeatureMesh, FeatureShape, build};
 use crate::{
     fas::{Sample, Tables},
-    reference::shared::{
-        FEATURE_BORDER, NONE, SAMPLE_BITS,
-        border::TILE_SAMPLES,
-        refine::{RefineSite, RefineTables},
+    reference::{
+        refine::{LEAST_SINE_SQUARE, RefineSite, RefineTables},
+        shared::{FEATURE_BORDER, NONE, SAMPLE_BITS, border::TILE_SAMPLES},
     },
 };
 
@@ -116,8 +115,8 @@ fn narrow(a: [f64; 3]) -> [f32; 3] {
 fn unit_normal(sample: &Sample<f64>) -> [f64; 3] {
     let [du, dv] = [sample.du, sample.dv].map(glam::DVec3::from);
     let area = du.cross(dv);
-    // As the stage `refine` does: a sine of 1e-4.
-    if area.length_squared() <= 1e-8 * du.length_squared() * dv.length_squared() {
+    let least = f64::from(LEAST_SINE_SQUARE) * du.length_squared() * dv.length_squared();
+    if area.length_squared() <= least {
         return [0.0, 0.0, 1.0];
     }
     area.normalize().into()

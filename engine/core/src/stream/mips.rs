@@ -1,14 +1,14 @@
-//! Imagery as it is drawn: a tile's texels with their colours weighed by their alpha, and every smaller version.
+//! Imagery as it is drawn: a tile's texels with premultiplied alpha, and all mip levels.
 //!
 //! Made by a loader thread from what the source hands out, so that neither planning nor drawing spends time on it. Knows
 //! texels; knows neither where they lie nor who draws them.
 //!
 //! Seen aslant a tile's texels lie closer than pixels, far more so in one direction than in the other, which no choice of
-//! level can mend: hence the smaller versions. Every texel of one is the mean of four, so that texel i of a version of n
-//! covers the share i / n to (i + 1) / n of the texels. Tiles share their outermost texels, and where a version's
+//! level can mend: hence the mip levels. Every texel of one is the mean of four, so that texel i of a level of n
+//! covers the share i / n to (i + 1) / n of the texels. Tiles share their outermost texels, and where a level's
 //! texel is about a pixel wide its outermost ones differ from the neighbour's as two pixels side by side do: no seam.
 //!
-//! Colours are weighed by alpha, in linear light, for then a filter may mix texels with ground that has no picture.
+//! Alpha is premultiplied, in linear light, for then a filter may mix texels with ground that has no picture.
 
 use std::sync::Arc;
 
@@ -17,25 +17,25 @@ use crate::pyramid::{
     light::{LINEAR, encode},
 };
 
-/// Texels of a picture and of its smaller versions: 256², 128², … 1.
+/// Texels of all mip levels: 256², 128², … 1.
 const TEXEL_COUNT: usize = 87_381;
 
-/// Bytes of a picture and of its smaller versions, four a texel.
+/// Bytes of all mip levels, four a texel.
 pub const COLOR_BYTES: u64 = 4 * TEXEL_COUNT as u64;
 
 /// Red, green and blue as linear light times alpha, and alpha, 0 to 1.
 type Light = [f32; 4];
 
-/// Red, green, blue (sRGB, weighed by alpha) and alpha of the picture, then of each smaller version, row by row; none
-/// unless there are 256 × 256 texels (of straight alpha).
+/// Red, green, blue (sRGB of premultiplied light) and alpha of every mip level, the largest first, row by row; none unless
+/// there are 256 × 256 texels (of straight alpha).
 #[must_use]
-pub fn picture(straight: &[u8]) -> Option<Arc<[u8]>> {
+pub fn mip_chain(straight: &[u8]) -> Option<Arc<[u8]>> {
     let (texels, rest) = straight.as_chunks::<4>();
     if texels.len() != COLOR_TEXELS * COLOR_TEXELS || !rest.is_empty() {
         return None;
     }
     let mut bytes = Vec::with_capacity(4 * TEXEL_COUNT);
-    bytes.extend(texels.iter().flat_map(weighed));
+    bytes.extend(texels.iter().flat_map(premultiplied));
     let mut lights: Vec<Light> = texels.iter().map(light).collect();
     let mut side = COLOR_TEXELS;
     while side > 1 {
@@ -52,8 +52,8 @@ fn light(&[r, g, b, alpha]: &[u8; 4]) -> Light {
     [r, g, b, share]
 }
 
-/// The texel with its colour weighed; nearly all are opaque and stay as they are.
-fn weighed(texel: &[u8; 4]) -> [u8; 4] {
+/// The texel with premultiplied alpha; nearly all are opaque and stay as they are.
+fn premultiplied(texel: &[u8; 4]) -> [u8; 4] {
     if texel[3] == u8::MAX {
         *texel
     } else {
@@ -91,11 +91,11 @@ mod tests {
         let texels: Vec<u8> = (0..side * side)
             .flat_map(|at| color(at / side, at % side))
             .collect();
-        picture(&texels).unwrap().as_chunks().0.to_vec()
+        mip_chain(&texels).unwrap().as_chunks().0.to_vec()
     }
 
     #[test]
-    fn one_colour_is_that_colour_in_all_versions() {
+    fn one_colour_is_that_colour_at_all_levels() {
         let texels = of(|_, _| [10, 100, 250, 255]);
         assert_eq!(texels.len(), TEXEL_COUNT);
         assert!(texels.iter().all(|texel| *texel == [10, 100, 250, 255]));
@@ -122,7 +122,7 @@ mod tests {
             }
         });
         assert_eq!(texels[255], [0; 4]);
-        // The last version: half of it is clear, so half the light is left and none of the clear texels' white.
+        // The last level: half of it is clear, so half the light is left and none of the clear texels' white.
         let last = texels[TEXEL_COUNT - 1];
         let half = [200, 40, 90].map(|value: usize| encode(LINEAR[value] / 2.0));
         assert_eq!(last, [half[0], half[1], half[2], 128]);
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn anything_but_a_whole_tile_is_no_picture() {
-        assert!(picture(&[0; 4 * 255 * 256]).is_none());
-        assert!(picture(&[0; 4 * 256 * 256 + 1]).is_none());
+        assert!(mip_chain(&[0; 4 * 255 * 256]).is_none());
+        assert!(mip_chain(&[0; 4 * 256 * 256 + 1]).is_none());
     }
 }
