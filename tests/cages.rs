@@ -384,7 +384,7 @@ fn landforms_that_cannot_be_are_told_in_one_line() {
         ),
         (1, args!["--along", "0,0 1e300,0"].to_vec(), "at most 1e150"),
         (
-            1,
+            2,
             args!["--along", "0,0 9,0", "--ground", rainier_pyramid()].to_vec(),
             "there is no ground at",
         ),
