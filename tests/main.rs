@@ -1,5 +1,6 @@
 //! End-to-end tests, one binary.
 
+mod browser;
 mod cages;
 mod commands;
 mod embed;

@@ -1,4 +1,4 @@
-//! What has to be on the machine: a Vulkan driver to draw with, and for the tests a Python that reads Zarr.
+//! What has to be on the machine: a Vulkan driver to draw with, and for the tests a Python that reads Zarr and a browser.
 //!
 //! Whatever is missing is installed with apt; where that cannot be, the error is the line to type.
 
@@ -79,6 +79,23 @@ pub(crate) fn python() -> Result<PathBuf> {
         );
     }
     Ok(python)
+}
+
+/// A Chromium to compile the shaders in. It is large, so only CI installs it; elsewhere none, and the test says so.
+pub(crate) fn browser() -> Result<Option<&'static str>> {
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    let found = || {
+        names
+            .into_iter()
+            .find(|name| succeeds(&mut command(name, &["--version"])))
+    };
+    if let Some(name) = found() {
+        return Ok(Some(name));
+    }
+    if std::env::var("CI").is_ok_and(|value| value == "true") {
+        apt(&["chromium"])?;
+    }
+    Ok(found())
 }
 
 /// True when a Vulkan driver has announced itself to the loader.

@@ -27,7 +27,7 @@ pub(crate) fn all() -> Result<()> {
     )?;
     setup::adapter("debug")?;
     let python = setup::python()?;
-    let tally = tests(&python)?;
+    let tally = tests(&python, setup::browser()?)?;
     run(
         "docs",
         cargo("doc --workspace --no-deps").env("RUSTDOCFLAGS", "-D warnings"),
@@ -68,12 +68,15 @@ fn remove(folder: PathBuf) -> Result<()> {
 }
 
 /// Every test of the workspace, documentation included, on a GPU that keeps to the letter of WebGPU.
-fn tests(python: &Path) -> Result<Tally> {
+fn tests(python: &Path, browser: Option<&str>) -> Result<Tally> {
     let mut tests = cargo("test --workspace --no-fail-fast");
     tests
         .env("REQUIRE_GPU", "1")
         .env("STRICT_WEBGPU_COMPLIANCE", "1")
         .env("DRUMLIN_PYTHON", python);
+    if let Some(browser) = browser {
+        tests.env("DRUMLIN_BROWSER", browser);
+    }
     let mut tally = Tally::default();
     let succeeded = watch("tests", &mut tests, |line| tally.see(line))?;
     if !succeeded || tally.failed > 0 {
