@@ -14,7 +14,7 @@ use std::{
     collections::BinaryHeap,
 };
 
-use super::{DepthRule, Feature, Features};
+use super::{DepthRule, Features};
 
 /// One in so many features due: all are looked at, which costs less than taking them from the heap.
 const ONE_IN: usize = 8;
