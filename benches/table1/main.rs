@@ -11,25 +11,20 @@
     reason = "positions of experiments are rounded to f32 on purpose"
 )]
 
-mod errors;
 mod rows;
-mod scheme;
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
 use clap::Parser;
 use drumlin_benches::{
+    errors::{Errors, blocks_at, depths_within, mean_edge_length},
     measure::{self, Machine, geometric_mean},
+    scheme::{self, Scheme},
     terrain_cage::{CageCounts, cage_counts},
 };
 use drumlin_core::cage::{Cage, CageBudget, read_obj};
 use serde::Serialize;
-
-use self::{
-    errors::{Errors, blocks_at, depths_within, mean_edge_length},
-    scheme::Scheme,
-};
 
 /// The paper's models; the cages have their counts, not their shape.
 const NAMES: [&str; 4] = ["hippo", "crocodile", "gorilla", "koala"];
@@ -45,7 +40,7 @@ const CHECK_STEPS: u32 = 23;
 #[derive(Parser)]
 struct Arguments {
     /// Folder with table1_hippo.obj, table1_crocodile.obj, table1_gorilla.obj and table1_koala.obj.
-    #[arg(long, default_value = "../shared/reference/catmull-clark/table1")]
+    #[arg(long, default_value = "assets/table1")]
     cages: PathBuf,
     /// Worst error allowed, in mean edge lengths of the cage.
     #[arg(long, default_value_t = 1e-3)]
@@ -78,6 +73,8 @@ struct Case {
     bound: f64,
     classic: Scheme,
     adaptive: Scheme,
+    /// Greatest distance from the limit of both.
+    worst_errors: [f64; 2],
 }
 
 impl Case {
@@ -116,15 +113,16 @@ fn case(name: &'static str, arguments: &Arguments) -> Result<Case> {
     let features = errors.by_feature(&blocks_at(&cage, &same())?, depth);
     let own = || depths_within(SHARE * bound, &features, vertices);
     let mut check = Errors::new(&cage, CHECK_STEPS)?;
-    let (same_error, own_error) = (check.worst(&same())?, check.worst(&own())?);
+    let worst_errors = [check.worst(&same())?, check.worst(&own())?];
     let runs = usize::from(arguments.runs);
     Ok(Case {
         name,
         cage: cage_counts(&cage),
         mean_edge_length,
         bound,
-        classic: scheme::measure(&cage, &same, same_error, runs)?,
-        adaptive: scheme::measure(&cage, &own, own_error, runs)?,
+        classic: scheme::measure(&cage, &same, runs)?,
+        adaptive: scheme::measure(&cage, &own, runs)?,
+        worst_errors,
     })
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use drumlin_benches::measure::{Table, thousands, three_digits};
 
-use crate::{Case, Report, scheme::Scheme};
+use crate::{Case, Report};
 
 /// What is timed and what is not.
 const NOTES: &str = "\
@@ -62,19 +62,15 @@ fn table(report: &Report) -> Table {
             case.name, counts.faces, counts.irregular_faces
         );
         let classic = format!("classic, {}", case.classic.deepest);
-        table.row(row(case, report.bound, [name, classic], &case.classic));
+        table.row(row(case, report.bound, [name, classic], 0));
         let adaptive = format!("adaptive, up to {}", case.adaptive.deepest);
-        table.row(row(
-            case,
-            report.bound,
-            [String::new(), adaptive],
-            &case.adaptive,
-        ));
+        table.row(row(case, report.bound, [String::new(), adaptive], 1));
     }
     table
 }
 
-fn row(case: &Case, bound: f64, names: [String; 2], scheme: &Scheme) -> Vec<String> {
+fn row(case: &Case, bound: f64, names: [String; 2], which: usize) -> Vec<String> {
+    let scheme = [&case.classic, &case.adaptive][which];
     let times = &scheme.one_thread;
     let millis = |seconds: f64| three_digits(1e3 * seconds);
     let figures = [
@@ -86,7 +82,7 @@ fn row(case: &Case, bound: f64, names: [String; 2], scheme: &Scheme) -> Vec<Stri
         thousands(scheme.patches),
         thousands(scheme.feature_patches),
         thousands(scheme.refined_points),
-        format!("{:.2e}", scheme.worst_error / case.mean_edge_length),
+        format!("{:.2e}", case.worst_errors[which] / case.mean_edge_length),
         format!("{bound:.0e}"),
     ];
     names.into_iter().chain(figures).collect()
