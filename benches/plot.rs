@@ -101,13 +101,13 @@ impl Plot {
         let [left, top, right, bottom] = FRAME.map(|at| at as i64);
         let x = (left + right - font::width(&self.x_name, LETTER)) / 2;
         font::write(picture, &self.title, [left, 8], (LETTER, INK));
-        font::write(picture, &self.y_name, [8, top - 22], (LETTER, INK));
+        font::write(picture, &self.y_name, [8, top - 30], (LETTER, INK));
         font::write(picture, &self.x_name, [x, bottom + 32], (LETTER, INK));
         let mut x = right;
         for (index, line) in self.lines.iter().enumerate().rev() {
             let color = COLORS[index % COLORS.len()];
             x -= font::width(&line.name, LETTER) + 18;
-            font::write(picture, &line.name, [x, top - 22], (LETTER, color));
+            font::write(picture, &line.name, [x, top - 30], (LETTER, color));
         }
     }
 }
