@@ -36,7 +36,7 @@ use self::bytes::Bytes;
 use self::tiff::{Ifd, Tiff};
 pub use error::DemError;
 pub use header::{OpenOptions, RasterHeader, SourceInfo, Window};
-pub use image::{Image, open_image};
+pub use image::{Image, Pixel, open_image};
 pub use mosaic::Mosaic;
 
 /// Samples of heights, read by window; void is NaN.
