@@ -14,4 +14,5 @@ mod picture;
 mod refine;
 mod shared_structs;
 mod support;
+mod synth;
 mod terrain;

@@ -12,6 +12,7 @@ mod info;
 mod interrupt;
 mod progress;
 mod sources;
+mod synth;
 mod validate;
 mod viewer;
 
@@ -51,6 +52,9 @@ enum Verb {
     /// Makes the cage of a cliff, an arch or a road, for `build --features`
     #[command(after_help = EXIT_CODES)]
     Feature(feature::Arguments),
+    /// Makes an elevation model: endless mountains, a function of a seed, the same on every machine
+    #[command(after_help = EXIT_CODES)]
+    Synth(synth::Arguments),
     /// Opens a window on a pyramid (`drumlin-view view`)
     #[command(disable_help_flag = true)]
     View(viewer::Arguments),
@@ -71,6 +75,7 @@ fn main() -> ExitCode {
         Verb::Height(arguments) => height::run(&arguments),
         Verb::Cage(arguments) => cage::run(&arguments),
         Verb::Feature(arguments) => feature::run(&arguments),
+        Verb::Synth(arguments) => synth::run(&arguments),
         Verb::View(arguments) => viewer::run("view", &arguments),
         Verb::Fly(arguments) => viewer::run("fly", &arguments),
     };

@@ -12,6 +12,7 @@ mod cache;
 mod dted;
 mod error;
 mod exr;
+mod geotiff;
 mod header;
 mod hgt;
 mod image;
@@ -22,6 +23,7 @@ mod plain;
 mod png;
 mod raw;
 mod samples;
+mod synth;
 #[cfg(test)]
 mod tests;
 mod tiff;
@@ -35,9 +37,11 @@ use std::path::Path;
 use self::bytes::Bytes;
 use self::tiff::{Ifd, Tiff};
 pub use error::DemError;
+pub use geotiff::{Compression, GeoTiffLayout, GeoTiffWriter, TIFF_TILE, write_raster};
 pub use header::{OpenOptions, RasterHeader, SourceInfo, Window};
 pub use image::{Image, Pixel, open_image};
 pub use mosaic::Mosaic;
+pub use synth::{SPACING as SYNTH_SPACING, Synth};
 
 /// Samples of heights, read by window; void is NaN.
 pub trait Raster: Send + Sync {

@@ -12,9 +12,10 @@ mod table;
 
 use self::chunk::Coding;
 use self::chunks::Chunks;
+pub(super) use self::geokeys::geo_key;
 pub(super) use self::georef::Georef;
 pub(super) use self::ifd::Ifd;
-use self::ifd::tag;
+pub(super) use self::ifd::tag;
 use self::mask::Mask;
 use self::metadata::BandMetadata;
 pub(super) use self::picture::Picture;

@@ -29,6 +29,8 @@ use crate::{
 pub const MAX_RULE_DEPTH: u8 = 6;
 /// Levels a wish must pass a depth by before the depth follows.
 const HYSTERESIS: f64 = 0.25;
+/// Levels by which [`Feature::hold`] is narrower than the rule: far more than its formulas round.
+const MARGIN: f64 = 1e-9;
 
 /// How depths are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -111,10 +113,10 @@ impl Features {
     ) -> Vec<u8> {
         let mut depths = vec![0; self.vertex_count];
         for feature in &self.list {
-            let distance = length(subtract(feature.position, eye)).max(1e-9);
-            let wish = feature.wish(pixels_per_radian / distance, rule);
-            depths[feature.vertex as usize] =
-                settle(wish, previous.get(feature.vertex as usize).copied());
+            let vertex = feature.vertex as usize;
+            depths[vertex] = feature
+                .look(eye, pixels_per_radian, rule, previous.get(vertex).copied())
+                .0;
         }
         depths
     }
@@ -134,6 +136,56 @@ impl Features {
 }
 
 impl Feature {
+    /// The depth seen from `eye` after `previous`, and the distance to the eye.
+    pub(super) fn look(
+        &self,
+        eye: [f64; 3],
+        pixels_per_radian: f64,
+        rule: DepthRule,
+        previous: Option<u8>,
+    ) -> (u8, f64) {
+        let distance = length(subtract(self.position, eye)).max(1e-9);
+        let wish = self.wish(pixels_per_radian / distance, rule);
+        (settle(wish, previous), distance)
+    }
+
+    /// The distances between which a depth stays as it is: nearer than the first and farther than the second the rule
+    /// may answer otherwise. Narrower by [`MARGIN`], so that roundings do not matter.
+    pub(super) fn hold(&self, depth: u8, pixels_per_radian: f64, rule: DepthRule) -> [f64; 2] {
+        let wish = f64::from(depth);
+        let reach = |levels: f64| self.reach(levels, pixels_per_radian, rule);
+        let near = if depth < MAX_RULE_DEPTH {
+            reach(wish + HYSTERESIS - MARGIN)
+        } else {
+            0.0
+        };
+        let far = if depth > 0 {
+            reach(wish - 1.0 - HYSTERESIS + MARGIN)
+        } else {
+            f64::INFINITY
+        };
+        [near, far]
+    }
+
+    /// The distance up to which a wish is at least `levels`: [`Feature::wish`] falls with distance, this inverts it.
+    fn reach(&self, levels: f64, pixels_per_radian: f64, rule: DepthRule) -> f64 {
+        match rule {
+            DepthRule::Error {
+                tolerance,
+                triangle,
+            } => {
+                let size = self.longest_edge / triangle * (-levels).exp2();
+                let shrink = self.eigenvalue.powf(2.0 * levels);
+                let error = self.distance_to_limit / tolerance * shrink;
+                let is_sharp = self.sharp_levels >= levels;
+                pixels_per_radian * if is_sharp { size } else { size.min(error) }
+            }
+            DepthRule::AreaRatio { area } => {
+                pixels_per_radian * (self.area / area).sqrt() * (-levels).exp2()
+            }
+        }
+    }
+
     /// The depth a rule asks for, with its fraction, where one unit of length is `pixels` on the screen.
     fn wish(&self, pixels: f64, rule: DepthRule) -> f64 {
         match rule {

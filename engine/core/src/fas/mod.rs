@@ -33,6 +33,7 @@ mod stencil;
 mod tables;
 #[cfg(test)]
 pub(crate) mod testing;
+mod watch;
 
 pub use crate::subdiv::Real;
 pub use blocks::{Blocks, CapEntry, Changes, Entry, Piece, Positions};
@@ -45,3 +46,4 @@ pub use pattern::PatchPattern;
 pub use rows::{BlendRow, LevelRows, PointCounts};
 pub use stencil::{PieceIndex, StencilTerm};
 pub use tables::{MAX_DEPTH, Tables};
+pub use watch::DepthWatch;

@@ -27,7 +27,10 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PyramidError> {
 }
 
 /// As [`write_whole`], for bytes that are written in pieces.
-pub(super) fn write_whole_with(
+///
+/// # Errors
+/// [`PyramidError::Io`], and what `write` says; what was at the path is still there then.
+pub fn write_whole_with(
     path: &Path,
     write: impl FnOnce(&mut File) -> Result<(), PyramidError>,
 ) -> Result<(), PyramidError> {

@@ -26,7 +26,7 @@ mod zarr_python;
 
 pub use error::PyramidError;
 pub use feature::{FeatureGroup, FeatureMetadata};
-pub use files::write_whole;
+pub use files::{write_whole, write_whole_with};
 pub use metadata::{ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};
 pub use patch_code::{HALF_OCTAVES, NEVER, patch_error, patch_nibble};
 pub use reader::Pyramid;

@@ -4,26 +4,34 @@
 
 use std::collections::BTreeMap;
 
+use self::geo_key::{
+    ANGULAR_UNIT, CITATION, ELLIPSOID, GEOGRAPHIC, GEOGRAPHIC_CITATION, INVERSE_FLATTENING,
+    LINEAR_UNIT, LINEAR_UNIT_METRES, MODEL_TYPE, PROJECTED, PROJECTED_CITATION, RASTER_TYPE,
+    SEMI_MAJOR, SEMI_MINOR, VERTICAL, VERTICAL_UNIT,
+};
 use super::super::{DemError, bytes::Bytes, units};
 use super::ifd::{Ifd, tag};
 use crate::geo::{Crs, CrsKind, Ellipsoid};
 
-const MODEL_TYPE: u16 = 1024;
-const RASTER_TYPE: u16 = 1025;
-const CITATION: u16 = 1026;
-const GEOGRAPHIC: u16 = 2048;
-const GEOGRAPHIC_CITATION: u16 = 2049;
-const ANGULAR_UNIT: u16 = 2054;
-const ELLIPSOID: u16 = 2056;
-const SEMI_MAJOR: u16 = 2057;
-const SEMI_MINOR: u16 = 2058;
-const INVERSE_FLATTENING: u16 = 2059;
-const PROJECTED: u16 = 3072;
-const PROJECTED_CITATION: u16 = 3073;
-const LINEAR_UNIT: u16 = 3076;
-const LINEAR_UNIT_METRES: u16 = 3077;
-const VERTICAL: u16 = 4096;
-const VERTICAL_UNIT: u16 = 4099;
+/// Numbers of keys.
+pub(crate) mod geo_key {
+    pub(crate) const MODEL_TYPE: u16 = 1024;
+    pub(crate) const RASTER_TYPE: u16 = 1025;
+    pub(crate) const CITATION: u16 = 1026;
+    pub(crate) const GEOGRAPHIC: u16 = 2048;
+    pub(crate) const GEOGRAPHIC_CITATION: u16 = 2049;
+    pub(crate) const ANGULAR_UNIT: u16 = 2054;
+    pub(crate) const ELLIPSOID: u16 = 2056;
+    pub(crate) const SEMI_MAJOR: u16 = 2057;
+    pub(crate) const SEMI_MINOR: u16 = 2058;
+    pub(crate) const INVERSE_FLATTENING: u16 = 2059;
+    pub(crate) const PROJECTED: u16 = 3072;
+    pub(crate) const PROJECTED_CITATION: u16 = 3073;
+    pub(crate) const LINEAR_UNIT: u16 = 3076;
+    pub(crate) const LINEAR_UNIT_METRES: u16 = 3077;
+    pub(crate) const VERTICAL: u16 = 4096;
+    pub(crate) const VERTICAL_UNIT: u16 = 4099;
+}
 
 /// "The user defines it in other keys."
 const USER_DEFINED: u16 = 32767;

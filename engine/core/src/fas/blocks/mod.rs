@@ -47,6 +47,8 @@ pub use self::{
     positions::Positions,
 };
 
+const TOO_DEEP: &str = "a feature's depth is at most 10";
+
 /// A feature with patches of its own around it.
 #[derive(Clone, Copy, Debug)]
 struct Block {
@@ -130,38 +132,93 @@ impl Blocks {
     /// Says so when the depths are not one a vertex, or one is above [`MAX_DEPTH`], or the points would be too many to
     /// be numbered. Nothing changes then.
     pub fn set_depths(&mut self, depths: &[u8]) -> Result<Changes, &'static str> {
-        if depths.len() != self.mesh.start.len() {
-            return Err("there must be one depth a vertex");
-        }
+        self.check(depths)?;
         if depths.iter().any(|&depth| depth > MAX_DEPTH) {
-            return Err("a feature's depth is at most 10");
+            return Err(TOO_DEEP);
         }
+        let differs = |&index: &u32| {
+            let vertex = self.blocks[index as usize].vertex;
+            self.depth(vertex) != depths[vertex as usize]
+        };
+        let moved = (0..self.blocks.len() as u32).filter(differs).collect();
+        self.change(depths, moved, !self.semi_sharp.lines.is_empty())
+    }
+
+    /// [`Blocks::set_depths`] where no depth but those of `vertices` differs from the last ones.
+    ///
+    /// Costs what has changed, however large the cage; a depth on a semi-sharp line costs a look at all lines.
+    ///
+    /// # Errors
+    /// As [`Blocks::set_depths`], and for a vertex that is not there. Nothing changes then.
+    pub fn change_depths(
+        &mut self,
+        depths: &[u8],
+        vertices: &[u32],
+    ) -> Result<Changes, &'static str> {
+        self.check(depths)?;
+        let mut moved = Vec::with_capacity(vertices.len());
+        let mut is_line_touched = false;
+        for &vertex in vertices {
+            match depths.get(vertex as usize) {
+                None => return Err("a vertex is not of the cage"),
+                Some(&depth) if depth > MAX_DEPTH => return Err(TOO_DEEP),
+                Some(_) => {}
+            }
+            is_line_touched |= self.is_on_line(vertex);
+            let found = self
+                .blocks
+                .binary_search_by_key(&vertex, |block| block.vertex);
+            moved.extend(found.ok().map(|index| index as u32));
+        }
+        moved.sort_unstable();
+        moved.dedup();
+        self.change(depths, moved, is_line_touched)
+    }
+
+    fn check(&self, depths: &[u8]) -> Result<(), &'static str> {
+        if depths.len() == self.mesh.start.len() {
+            Ok(())
+        } else {
+            Err("there must be one depth a vertex")
+        }
+    }
+
+    /// Moves these blocks, by index and each once, and with `lines` those of semi-sharp lines.
+    fn change(
+        &mut self,
+        depths: &[u8],
+        mut moved: Vec<u32>,
+        lines: bool,
+    ) -> Result<Changes, &'static str> {
+        moved.retain(|&index| !self.is_on_line(self.blocks[index as usize].vertex));
         // Free ranges are never more than those in use, see `compact`.
-        if 2 * self.points_at(depths) + u64::from(self.first.rows.end_point()) >= u64::from(NONE) {
+        if 2 * self.points_after(depths, &moved) + u64::from(self.first.rows.end_point())
+            >= u64::from(NONE)
+        {
             return Err("the depths make more points than can be numbered");
         }
         let mut changes = Changes::default();
         let mut crossed = Vec::new();
-        for index in 0..self.blocks.len() {
-            let block = self.blocks[index];
-            let (old, new) = (self.depth(block.vertex), depths[block.vertex as usize]);
-            if old == new || self.is_on_line(block.vertex) {
+        for index in moved {
+            let vertex = self.blocks[index as usize].vertex;
+            let (old, new) = (self.depth(vertex), depths[vertex as usize]);
+            if old == new {
                 continue;
             }
-            self.mesh.feature[block.vertex as usize] = new;
+            self.mesh.feature[vertex as usize] = new;
             if (old == 0) != (new == 0) {
-                crossed.push(block.vertex);
+                crossed.push(vertex);
             }
-            self.move_block(index, old, new);
+            self.move_block(index as usize, old, new);
             if new > 1 {
-                changes.blocks.push(index as u32);
+                changes.blocks.push(index);
             }
         }
-        self.set_line_depths(depths, &mut crossed, &mut changes);
+        if lines {
+            self.set_line_depths(depths, &mut crossed, &mut changes);
+        }
         self.want(&crossed, &mut changes);
-        if self.runs.free_points()
-            > self.runs.end() - self.first.rows.end_point() - self.runs.free_points()
-        {
+        if self.runs.free_points() > self.points_in_use() {
             self.compact(&mut changes);
         }
         Ok(changes)
@@ -223,18 +280,21 @@ impl Blocks {
                 .map_or(0, Tables::byte_count)
     }
 
-    /// Points of blocks at other depths, those around semi-sharp lines as they are.
-    fn points_at(&self, depths: &[u8]) -> u64 {
-        let lines = self
-            .semi_sharp
-            .tables
-            .as_ref()
-            .map_or(0, Tables::made_point_count);
-        let blocks = self.laid().map(|block| {
-            let depth = depths[block.vertex as usize];
-            u64::from(depth.saturating_sub(1)) * u64::from(self.template(block).lattice.points())
-        });
-        blocks.sum::<u64>() + u64::from(lines)
+    /// Points below level 1.
+    fn points_in_use(&self) -> u32 {
+        self.runs.end() - self.first.rows.end_point() - self.runs.free_points()
+    }
+
+    /// Points below level 1 once some blocks have other depths, those around semi-sharp lines as they are.
+    fn points_after(&self, depths: &[u8], moved: &[u32]) -> u64 {
+        let mut points = u64::from(self.points_in_use());
+        for &index in moved {
+            let block = &self.blocks[index as usize];
+            let new = depths[block.vertex as usize];
+            points += u64::from(self.run_length(block, new));
+            points -= u64::from(self.run_length(block, self.depth(block.vertex)));
+        }
+        points
     }
 
     /// Blocks whose levels from 2 on are laid by the closed form.

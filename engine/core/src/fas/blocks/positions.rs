@@ -47,7 +47,7 @@ impl<T: Real> Positions<T> {
         self.make_all(blocks);
     }
 
-    /// Makes the points that [`Blocks::set_depths`] changed.
+    /// Makes the points that [`Blocks::set_depths`] or [`Blocks::change_depths`] changed.
     ///
     /// # Panics
     /// When the positions are not those of `blocks` before the change.
