@@ -64,7 +64,7 @@ pub(crate) fn run_unpack(arguments: &UnpackArguments) -> Result<Outcome> {
     let output = &arguments.output;
     let progress = Progress::new();
     unpack(&pyramid, output, arguments.overwrite, &mut |done, total| {
-        progress.tell("unpacking", done, total)
+        progress.tell("unpacking", done, total);
     })?;
     drop(progress);
     let bytes = pyramid.store().bytes_under("")?;
