@@ -29,7 +29,7 @@ fn packed(pyramid: &Path, zip: &Path) -> Result<(), PyramidError> {
     let mut told = Vec::new();
     write_whole_with(zip, |file| {
         pack(&pyramid, file, zip, &mut |done, total| {
-            told.push([done, total])
+            told.push([done, total]);
         })
     })?;
     assert_eq!(told.first().map(|told| told[0]), Some(0));
@@ -102,7 +102,9 @@ fn a_damaged_pyramid_is_not_packed_and_the_error_names_the_file() {
     flipped[good.len() / 2] ^= 1;
     for bad in [Some(&flipped[..]), Some(&good[..100]), None] {
         fs::remove_file(folder.join(key)).unwrap();
-        bad.map(|bad| fs::write(folder.join(key), bad).unwrap());
+        if let Some(bad) = bad {
+            fs::write(folder.join(key), bad).unwrap();
+        }
         let error = packed(&folder, &zip).unwrap_err();
         assert!(matches!(error, PyramidError::Invalid { .. }));
         assert!(error.to_string().contains(key), "{error}");
