@@ -57,7 +57,7 @@ impl Bytes {
             levels: levels
                 .map(|level| count(pyramid.join("tile").join(level.to_string())))
                 .collect::<Result<_>>()?,
-            color: count(pyramid.join("color"))?,
+            color: count(pyramid.join("color"))? + count(pyramid.join("alpha"))?,
             all: count(pyramid.to_owned())?,
         })
     }
@@ -151,8 +151,8 @@ fn lines(metadata: &Metadata, bytes: &Bytes) -> Result<String> {
         let bytes = size::display(bytes.color);
         writeln!(
             text,
-            "  imagery   {} levels of {} texels a tile, {bytes}",
-            color.levels, color.texels
+            "  imagery   {} levels of {} texels a tile, {bytes}, {}",
+            color.levels, color.texels, color.codec
         )?;
     }
     let color = metadata.color.iter().flat_map(|color| &color.sources);

@@ -155,12 +155,8 @@ fn check_nodes(path: &Path, metadata: &Metadata, report: &mut Report) {
         );
     }
     let Some(color) = &metadata.color else { return };
-    check("color".into(), zarr::group_json());
-    for level in 0..color.levels {
-        check(
-            format!("color/{level}"),
-            zarr::color_array_json(metadata.grid.tiles(level)),
-        );
+    for (name, text) in zarr::color_nodes(metadata, color) {
+        check(name, text);
     }
 }
 
