@@ -10,6 +10,7 @@ mod feature;
 mod height;
 mod info;
 mod interrupt;
+mod pack;
 mod progress;
 mod sources;
 mod synth;
@@ -52,6 +53,12 @@ enum Verb {
     /// Makes the cage of a cliff, an arch or a road, for `build --features`
     #[command(after_help = EXIT_CODES)]
     Feature(feature::Arguments),
+    /// Makes one file of a pyramid: a ZIP archive, uncompressed, that every verb reads
+    #[command(after_help = EXIT_CODES)]
+    Pack(pack::PackArguments),
+    /// Makes a folder of a pyramid's archive again
+    #[command(after_help = EXIT_CODES)]
+    Unpack(pack::UnpackArguments),
     /// Makes an elevation model: endless mountains, a function of a seed, the same on every machine
     #[command(after_help = EXIT_CODES)]
     Synth(synth::Arguments),
@@ -75,6 +82,8 @@ fn main() -> ExitCode {
         Verb::Height(arguments) => height::run(&arguments),
         Verb::Cage(arguments) => cage::run(&arguments),
         Verb::Feature(arguments) => feature::run(&arguments),
+        Verb::Pack(arguments) => pack::run_pack(&arguments),
+        Verb::Unpack(arguments) => pack::run_unpack(&arguments),
         Verb::Synth(arguments) => synth::run(&arguments),
         Verb::View(arguments) => viewer::run("view", &arguments),
         Verb::Fly(arguments) => viewer::run("fly", &arguments),

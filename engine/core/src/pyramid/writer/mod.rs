@@ -12,6 +12,7 @@
 //! finished; a second run takes over what is there. Knows files and bytes; knows no heights.
 
 mod block;
+mod copy;
 mod place;
 
 use std::{
@@ -296,29 +297,9 @@ impl PyramidWriter {
     }
 
     fn write_nodes(&self, metadata: &Metadata) -> Result<(), PyramidError> {
-        let node =
-            |name: &str, text: &[u8]| write_whole(&self.folder.join(name).join(zarr::NODE), text);
-        node("tile", &zarr::group_json())?;
-        for (index, level) in metadata.levels.iter().enumerate() {
-            node(
-                &format!("tile/{index}"),
-                &zarr::tile_array_json(level.tiles, &RecordLayout::new(level)),
-            )?;
-        }
-        if let Some(features) = &metadata.features {
-            node("feature", &zarr::group_json())?;
-            node(
-                &format!("feature/{}", features.level),
-                &zarr::feature_array_json(metadata.grid.tiles(features.level), features),
-            )?;
-        }
-        let Some(color) = &metadata.color else {
-            return Ok(());
-        };
-        for (name, text) in zarr::color_nodes(metadata, color) {
-            node(&name, &text)?;
-        }
-        Ok(())
+        zarr::nodes(metadata)
+            .iter()
+            .try_for_each(|(key, text)| write_whole(&self.folder.join(key), text))
     }
 
     fn write_manifest(&self, shards: &[ShardInfo]) -> Result<(), PyramidError> {
