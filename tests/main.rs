@@ -4,6 +4,7 @@ mod browser;
 mod cages;
 mod commands;
 mod embed;
+mod export;
 mod features;
 mod flight;
 mod golden;

@@ -9,6 +9,7 @@
 mod ascii;
 mod bytes;
 mod cache;
+mod crop;
 mod dted;
 mod error;
 mod exr;
@@ -37,6 +38,7 @@ use std::path::Path;
 
 use self::bytes::Bytes;
 use self::tiff::{Ifd, Tiff};
+pub use crop::Crop;
 pub use error::DemError;
 pub use geotiff::{Compression, GeoTiffLayout, GeoTiffWriter, TIFF_TILE, write_raster};
 pub use header::{OpenOptions, RasterHeader, SourceInfo, Window};

@@ -3,9 +3,12 @@
 //! `FORMAT.md` beside this crate draws every byte. Knows files and numbers; knows no camera and no screen.
 
 pub mod build;
+mod diff;
 mod error;
+mod export;
 pub mod feature;
 mod files;
+mod heights;
 mod jpeg;
 pub(crate) mod light;
 mod manifest;
@@ -27,9 +30,12 @@ mod zarr;
 #[cfg(test)]
 mod zarr_python;
 
+pub use diff::{LevelDifference, diff};
 pub use error::PyramidError;
+pub use export::export_geotiff;
 pub use feature::{FeatureGroup, FeatureMetadata};
 pub use files::{write_whole, write_whole_with};
+pub use heights::LevelHeights;
 pub use metadata::{ColorCodec, ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};
 pub use pack::{pack, unpack};
 pub use patch_code::{HALF_OCTAVES, NEVER, patch_error, patch_nibble};
