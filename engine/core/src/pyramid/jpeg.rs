@@ -300,7 +300,7 @@ mod tests {
     fn tile(row: usize, column: usize) -> Vec<u8> {
         let texel = |row: usize, column: usize| {
             let wave = 60.0 * ((row as f64) / 9.0).sin() + 50.0 * ((column as f64) / 23.0).cos();
-            let step = if (row / 40 + column / 56) % 2 == 0 {
+            let step = if (row / 40 + column / 56).is_multiple_of(2) {
                 0.0
             } else {
                 70.0
