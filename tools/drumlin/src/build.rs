@@ -9,7 +9,7 @@ use drumlin_core::{
     dem::{self, DemError, Image, Mosaic, OpenOptions, Raster},
     geo::CrsKind,
     pyramid::{
-        PyramidError, SourceMetadata, VerticalReference,
+        ColorCodec, PyramidError, SourceMetadata, VerticalReference,
         build::{BuildOptions, BuildPlan, BuildReport, Imagery, build, plan},
         feature::FeatureInput,
     },
@@ -54,6 +54,9 @@ pub(crate) struct Arguments {
     /// overlap, the later one wins; where one has alpha, a mask or a value for nothing, what is under it shows
     #[arg(long, value_name = "IMG", num_args = 1..)]
     imagery: Vec<PathBuf>,
+    /// How pictures are stored: without loss, or as JPEG of a quality from 1 to 100
+    #[arg(long, value_name = "zstd|jpeg[:QUALITY]", value_parser = color_codec, default_value = "zstd")]
+    imagery_codec: ColorCodec,
     /// Cages to lay into the finest level: OBJ with tags and a line "# drumlin position X Y Z"
     #[arg(long, value_name = "FILE", num_args = 1..)]
     features: Vec<PathBuf>,
@@ -88,6 +91,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
         .collect::<Result<_>>()?;
     let imagery = (!images.is_empty()).then_some(Imagery {
         images: &images,
+        codec: arguments.imagery_codec,
         sources: describe(&arguments.imagery)?,
     });
     let options = options(arguments)?;
@@ -113,6 +117,21 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
     };
     print(&text)?;
     Ok(Outcome::Done)
+}
+
+/// A codec as it is typed.
+fn color_codec(text: &str) -> Result<ColorCodec, String> {
+    let quality = match text.split_once(':') {
+        None if text == "zstd" => return Ok(ColorCodec::Zstd),
+        None if text == "jpeg" => ColorCodec::QUALITY,
+        Some(("jpeg", quality)) => quality.parse().unwrap_or(0),
+        _ => return Err("zstd, jpeg and jpeg:QUALITY are known".into()),
+    };
+    if (1..=100).contains(&quality) {
+        Ok(ColorCodec::Jpeg { quality })
+    } else {
+        Err("a quality is a number from 1 to 100".into())
+    }
 }
 
 fn options(arguments: &Arguments) -> Result<BuildOptions> {
@@ -259,7 +278,11 @@ fn lines(arguments: &Arguments, report: &BuildReport) -> String {
         );
     }
     if report.color_levels > 0 {
-        text += &format!(", {} of imagery", size::display(report.color_bytes));
+        text += &format!(
+            ", {} of imagery ({})",
+            size::display(report.color_bytes),
+            arguments.imagery_codec
+        );
     }
     let samples = f64::from(rows) * f64::from(columns) / report.seconds.max(1e-9) / 1e6;
     text + &format!(

@@ -229,7 +229,7 @@ fn fingerprint(
 ) -> String {
     let header = raster.header();
     let extents = |images: &[Image]| images.iter().map(|image| image.extent).collect::<Vec<_>>();
-    let imagery = imagery.map(|imagery| (&imagery.sources, extents(imagery.images)));
+    let imagery = imagery.map(|imagery| (&imagery.sources, extents(imagery.images), imagery.codec));
     format!(
         "builder {BUILDER} {:?} {:?} {} {scale:?} {:?} {imagery:?} {}",
         header.grid,

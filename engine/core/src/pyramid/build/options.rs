@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::dem::Image;
 use crate::pyramid::feature::FeatureInput;
-use crate::pyramid::{PyramidError, SourceMetadata, VerticalReference};
+use crate::pyramid::{ColorCodec, PyramidError, SourceMetadata, VerticalReference};
 
 /// What a build is asked for.
 #[derive(Clone, Debug, Default)]
@@ -39,6 +39,8 @@ pub struct BuildOptions {
 pub struct Imagery<'a> {
     /// The pictures, later ones over earlier ones; one without an extent is stretched over the elevation model.
     pub images: &'a [Image],
+    /// How its tiles are stored.
+    pub codec: ColorCodec,
     /// Its files.
     pub sources: Vec<SourceMetadata>,
 }

@@ -72,7 +72,7 @@ pub(super) fn write(
             Ok(shown.map(Vec::into_flattened))
         };
         for shard in (0..rows).flat_map(|row| (0..columns).map(move |column| [row, column])) {
-            infos.push(writer.write_color_shard(level, tiles, shard, &texels)?);
+            infos.extend(writer.write_color_shard(imagery.codec, level, tiles, shard, &texels)?);
             let inside = [0, 1]
                 .map(|axis| u64::from((tiles[axis] - shard[axis] * SHARD_TILES).min(SHARD_TILES)));
             advance(inside[0] * inside[1] * COLOR_TEXELS as u64)?;
@@ -87,6 +87,7 @@ pub(super) fn write(
         ColorMetadata {
             levels,
             texels,
+            codec: imagery.codec,
             sources: imagery.sources.clone(),
         },
         infos,
