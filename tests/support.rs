@@ -186,6 +186,16 @@ pub(crate) fn has_gpu() -> bool {
     })
 }
 
+/// One of GDAL's programs; `None` says that it was skipped: `cargo verify` does not set GDAL up.
+pub(crate) fn gdal(program: &str) -> Option<Command> {
+    let found = Command::new(program).arg("--version").output();
+    if found.is_ok_and(|output| output.status.success()) {
+        return Some(Command::new(program));
+    }
+    println!("skipped: no {program} here");
+    None
+}
+
 /// The Python with zarr that `cargo verify` sets up; `None` says that it was skipped.
 ///
 /// # Panics

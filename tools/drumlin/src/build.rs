@@ -9,7 +9,7 @@ use drumlin_core::{
     dem::{self, DemError, Image, Mosaic, OpenOptions, Raster},
     geo::CrsKind,
     pyramid::{
-        PyramidError, VerticalReference,
+        ColorCodec, PyramidError, SourceMetadata, VerticalReference,
         build::{BuildOptions, BuildPlan, BuildReport, Imagery, build, plan},
         feature::FeatureInput,
     },
@@ -50,9 +50,13 @@ pub(crate) struct Arguments {
     /// Metres a unit of the stored numbers
     #[arg(long, value_name = "METRES")]
     scale: Option<f64>,
-    /// A picture to lay over the terrain (PNG, JPEG, TIFF): of the same CRS, or of none and then stretched
-    #[arg(long, value_name = "IMG")]
-    imagery: Option<PathBuf>,
+    /// Pictures to lay over the terrain (PNG, JPEG, TIFF): of the same CRS, or of none and then stretched; where several
+    /// overlap, the later one wins; where one has alpha, a mask or a value for nothing, what is under it shows
+    #[arg(long, value_name = "IMG", num_args = 1..)]
+    imagery: Vec<PathBuf>,
+    /// How pictures are stored: without loss, or as JPEG of a quality from 1 to 100
+    #[arg(long, value_name = "zstd|jpeg[:QUALITY]", value_parser = color_codec, default_value = "zstd")]
+    imagery_codec: ColorCodec,
     /// Cages to lay into the finest level: OBJ with tags and a line "# drumlin position X Y Z"
     #[arg(long, value_name = "FILE", num_args = 1..)]
     features: Vec<PathBuf>,
@@ -81,18 +85,15 @@ enum Vertical {
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
     let cancel = interrupt::flag()?;
     let raster = open(arguments)?;
-    let image = arguments
-        .imagery
-        .as_deref()
-        .map(|file| open_imagery(file, &*raster))
-        .transpose()?;
-    let imagery = match (&image, &arguments.imagery) {
-        (Some(image), Some(file)) => Some(Imagery {
-            image,
-            sources: vec![sources::describe(file)?],
-        }),
-        _ => None,
-    };
+    let images = arguments.imagery.iter();
+    let images: Vec<Image> = images
+        .map(|file| open_imagery(arguments, file, &*raster))
+        .collect::<Result<_>>()?;
+    let imagery = (!images.is_empty()).then_some(Imagery {
+        images: &images,
+        codec: arguments.imagery_codec,
+        sources: describe(&arguments.imagery)?,
+    });
     let options = options(arguments)?;
     if arguments.dry_run {
         let plan = plan(&*raster, imagery.as_ref(), &options, &cancel)?;
@@ -118,12 +119,22 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
+/// A codec as it is typed.
+fn color_codec(text: &str) -> Result<ColorCodec, String> {
+    let quality = match text.split_once(':') {
+        None if text == "zstd" => return Ok(ColorCodec::Zstd),
+        None if text == "jpeg" => ColorCodec::QUALITY,
+        Some(("jpeg", quality)) => quality.parse().unwrap_or(0),
+        _ => return Err("zstd, jpeg and jpeg:QUALITY are known".into()),
+    };
+    if (1..=100).contains(&quality) {
+        Ok(ColorCodec::Jpeg { quality })
+    } else {
+        Err("a quality is a number from 1 to 100".into())
+    }
+}
+
 fn options(arguments: &Arguments) -> Result<BuildOptions> {
-    let sources: Result<Vec<_>> = arguments
-        .inputs
-        .iter()
-        .map(|file| sources::describe(file))
-        .collect();
     Ok(BuildOptions {
         output: arguments.output.clone(),
         overwrite: arguments.overwrite,
@@ -141,8 +152,12 @@ fn options(arguments: &Arguments) -> Result<BuildOptions> {
             .iter()
             .map(|file| feature(file))
             .collect::<Result<_>>()?,
-        sources: sources?,
+        sources: describe(&arguments.inputs)?,
     })
+}
+
+fn describe(files: &[PathBuf]) -> Result<Vec<SourceMetadata>> {
+    files.iter().map(|file| sources::describe(file)).collect()
 }
 
 /// Reads a cage and where it stands.
@@ -165,7 +180,7 @@ fn open(arguments: &Arguments) -> Result<Box<dyn Raster>> {
     let options = OpenOptions {
         spacing: arguments.spacing,
         scale: arguments.scale,
-        cache_bytes: cache_bytes(arguments),
+        cache_bytes: cache_bytes(arguments, arguments.inputs.len()),
         ..OpenOptions::default()
     };
     let mut rasters = Vec::new();
@@ -190,22 +205,25 @@ fn open(arguments: &Arguments) -> Result<Box<dyn Raster>> {
         .ok_or_else(|| PyramidError::Refused("no input".into()).into())
 }
 
-/// Bytes of decoded parts kept for each input: together no more than a quarter of the budget; of several inputs, no
-/// more than one has as a rule.
-fn cache_bytes(arguments: &Arguments) -> Option<usize> {
+/// Bytes of decoded parts kept for each of `count` inputs: together no more than a quarter of the budget; of several
+/// inputs, no more than one has as a rule.
+fn cache_bytes(arguments: &Arguments, count: usize) -> Option<usize> {
     let quarter = arguments.memory_budget.map(|budget| budget / 4);
-    let count = arguments.inputs.len() as u64;
     let each = if count > 1 {
-        Some(quarter.unwrap_or(CACHE_BYTES).min(CACHE_BYTES) / count)
+        Some(quarter.unwrap_or(CACHE_BYTES).min(CACHE_BYTES) / count as u64)
     } else {
         quarter
     };
     each.map(|bytes| usize::try_from(bytes).unwrap_or(usize::MAX))
 }
 
-/// Reads the picture; one that says where it lies must say so in the terrain's CRS.
-fn open_imagery(file: &Path, raster: &dyn Raster) -> Result<Image> {
-    let image = dem::open_image(file)?;
+/// Opens a picture; one that says where it lies must say so in the terrain's CRS.
+fn open_imagery(arguments: &Arguments, file: &Path, raster: &dyn Raster) -> Result<Image> {
+    let options = OpenOptions {
+        cache_bytes: cache_bytes(arguments, arguments.imagery.len()),
+        ..OpenOptions::default()
+    };
+    let image = dem::open_image(file, &options)?;
     let crs = &raster.header().crs;
     let known = image.extent.is_some() && image.crs.kind != CrsKind::Unknown;
     if known && !image.crs.same_as(crs) {
@@ -260,7 +278,11 @@ fn lines(arguments: &Arguments, report: &BuildReport) -> String {
         );
     }
     if report.color_levels > 0 {
-        text += &format!(", {} of imagery", size::display(report.color_bytes));
+        text += &format!(
+            ", {} of imagery ({})",
+            size::display(report.color_bytes),
+            arguments.imagery_codec
+        );
     }
     let samples = f64::from(rows) * f64::from(columns) / report.seconds.max(1e-9) / 1e6;
     text + &format!(

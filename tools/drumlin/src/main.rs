@@ -6,12 +6,17 @@
 mod arguments;
 mod build;
 mod cage;
+mod diff;
+mod export;
+mod extract;
 mod feature;
 mod height;
 mod info;
 mod interrupt;
+mod pack;
 mod progress;
 mod sources;
+mod synth;
 mod validate;
 mod viewer;
 
@@ -51,6 +56,24 @@ enum Verb {
     /// Makes the cage of a cliff, an arch or a road, for `build --features`
     #[command(after_help = EXIT_CODES)]
     Feature(feature::Arguments),
+    /// Compares the heights of two pyramids; exit code 1 where they differ
+    #[command(after_help = EXIT_CODES)]
+    Diff(diff::Arguments),
+    /// Cuts a box out of a pyramid's level, as a GeoTIFF of exactly its heights
+    #[command(after_help = EXIT_CODES)]
+    Extract(extract::Arguments),
+    /// Writes a pyramid's heights for other programs
+    #[command(after_help = EXIT_CODES)]
+    Export(export::Arguments),
+    /// Makes one file of a pyramid: a ZIP archive, uncompressed, that every verb reads
+    #[command(after_help = EXIT_CODES)]
+    Pack(pack::PackArguments),
+    /// Makes a folder of a pyramid's archive again
+    #[command(after_help = EXIT_CODES)]
+    Unpack(pack::UnpackArguments),
+    /// Makes an elevation model: endless mountains, a function of a seed, the same on every machine
+    #[command(after_help = EXIT_CODES)]
+    Synth(synth::Arguments),
     /// Opens a window on a pyramid (`drumlin-view view`)
     #[command(disable_help_flag = true)]
     View(viewer::Arguments),
@@ -71,6 +94,12 @@ fn main() -> ExitCode {
         Verb::Height(arguments) => height::run(&arguments),
         Verb::Cage(arguments) => cage::run(&arguments),
         Verb::Feature(arguments) => feature::run(&arguments),
+        Verb::Diff(arguments) => diff::run(&arguments),
+        Verb::Extract(arguments) => extract::run(&arguments),
+        Verb::Export(arguments) => export::run(&arguments),
+        Verb::Pack(arguments) => pack::run_pack(&arguments),
+        Verb::Unpack(arguments) => pack::run_unpack(&arguments),
+        Verb::Synth(arguments) => synth::run(&arguments),
         Verb::View(arguments) => viewer::run("view", &arguments),
         Verb::Fly(arguments) => viewer::run("fly", &arguments),
     };

@@ -9,9 +9,11 @@
 mod ascii;
 mod bytes;
 mod cache;
+mod crop;
 mod dted;
 mod error;
 mod exr;
+mod geotiff;
 mod header;
 mod hgt;
 mod image;
@@ -20,8 +22,10 @@ mod mosaic;
 mod placement;
 mod plain;
 mod png;
+mod projection;
 mod raw;
 mod samples;
+mod synth;
 #[cfg(test)]
 mod tests;
 mod tiff;
@@ -34,10 +38,13 @@ use std::path::Path;
 
 use self::bytes::Bytes;
 use self::tiff::{Ifd, Tiff};
+pub use crop::Crop;
 pub use error::DemError;
+pub use geotiff::{Compression, GeoTiffLayout, GeoTiffWriter, TIFF_TILE, write_raster};
 pub use header::{OpenOptions, RasterHeader, SourceInfo, Window};
-pub use image::{Image, open_image};
+pub use image::{Image, Pixel, open_image};
 pub use mosaic::Mosaic;
+pub use synth::{SPACING as SYNTH_SPACING, Synth};
 
 /// Samples of heights, read by window; void is NaN.
 pub trait Raster: Send + Sync {

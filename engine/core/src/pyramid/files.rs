@@ -2,7 +2,7 @@
 
 use std::{
     fs::{self, File},
-    io::{ErrorKind, Write},
+    io::{ErrorKind, Read, Write},
     path::{Path, PathBuf},
 };
 
@@ -27,7 +27,10 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PyramidError> {
 }
 
 /// As [`write_whole`], for bytes that are written in pieces.
-pub(super) fn write_whole_with(
+///
+/// # Errors
+/// [`PyramidError::Io`], and what `write` says; what was at the path is still there then.
+pub fn write_whole_with(
     path: &Path,
     write: impl FnOnce(&mut File) -> Result<(), PyramidError>,
 ) -> Result<(), PyramidError> {
@@ -52,6 +55,27 @@ pub(super) fn write_whole_with(
     }
     fs::rename(&partial, path).map_err(PyramidError::io("renaming", &partial))?;
     sync_folder(folder)
+}
+
+/// Copies all there is to read; how many bytes, and their BLAKE3. The names are for messages.
+pub(super) fn copy_hashed(
+    from: &mut dyn Read,
+    from_name: &str,
+    to: &mut dyn Write,
+    to_path: &Path,
+) -> Result<(u64, String), PyramidError> {
+    let mut hasher = blake3::Hasher::new();
+    let mut piece = vec![0; 1 << 20];
+    loop {
+        let count = match from.read(&mut piece) {
+            Ok(0) => return Ok((hasher.count(), hasher.finalize().to_hex().to_string())),
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            read => read.map_err(PyramidError::io("reading", from_name))?,
+        };
+        hasher.update(&piece[..count]);
+        to.write_all(&piece[..count])
+            .map_err(PyramidError::io("writing", to_path))?;
+    }
 }
 
 /// Removes a folder and all in it, where there is one.

@@ -3,11 +3,17 @@
 //! `FORMAT.md` beside this crate draws every byte. Knows files and numbers; knows no camera and no screen.
 
 pub mod build;
+mod diff;
 mod error;
+mod export;
 pub mod feature;
 mod files;
+mod heights;
+mod jpeg;
 pub(crate) mod light;
+mod manifest;
 mod metadata;
+mod pack;
 mod patch_code;
 mod reader;
 mod record;
@@ -24,15 +30,21 @@ mod zarr;
 #[cfg(test)]
 mod zarr_python;
 
+pub use diff::{LevelDifference, diff};
 pub use error::PyramidError;
+pub use export::export_geotiff;
 pub use feature::{FeatureGroup, FeatureMetadata};
-pub use files::write_whole;
-pub use metadata::{ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};
+pub use files::{write_whole, write_whole_with};
+pub use heights::LevelHeights;
+pub use metadata::{ColorCodec, ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};
+pub use pack::{pack, unpack};
 pub use patch_code::{HALF_OCTAVES, NEVER, patch_error, patch_nibble};
 pub use reader::Pyramid;
 pub use record::{Record, RecordLayout, RecordParts, VOID_BYTES, number_bytes};
 pub use shard::{SHARD_TILES, shard_count, shard_shape};
-pub use store::{FaultStore, Faults, FileStore, MappedStore, Store, StoreError};
+pub use store::{
+    FaultStore, Faults, FileStore, MappedStore, Store, StoreError, ZipStore, open_store,
+};
 pub use tile::{Summary, Tile};
 pub use validate::{Finding, Report, validate};
 pub use writer::{Contents, PyramidWriter, ShardInfo};

@@ -78,6 +78,7 @@ impl Synthetic {
 
     pub(crate) fn with_imagery(mut self, levels: u8) -> Self {
         self.metadata.color = Some(ColorMetadata {
+            codec: crate::pyramid::ColorCodec::Zstd,
             levels,
             texels: 256,
             sources: Vec::new(),

@@ -50,12 +50,12 @@ use self::plan::Shape;
 use self::records::Records;
 use self::scale::Scale;
 use super::{Metadata, PyramidError, PyramidWriter, ShardInfo, files::remove_folder};
-use crate::dem::Raster;
+use crate::dem::{Image, Raster};
 use crate::geo::Grid;
 
 /// The version of the builder's arithmetic: to be raised with every change after which the same input gives other
 /// bytes, so that no build is gone on with by a builder that would have made it otherwise.
-const BUILDER: u32 = 1;
+const BUILDER: u32 = 2;
 
 /// Builds a pyramid.
 ///
@@ -228,7 +228,8 @@ fn fingerprint(
     scale: &Scale,
 ) -> String {
     let header = raster.header();
-    let imagery = imagery.map(|imagery| (&imagery.sources, imagery.image.extent));
+    let extents = |images: &[Image]| images.iter().map(|image| image.extent).collect::<Vec<_>>();
+    let imagery = imagery.map(|imagery| (&imagery.sources, extents(imagery.images), imagery.codec));
     format!(
         "builder {BUILDER} {:?} {:?} {} {scale:?} {:?} {imagery:?} {}",
         header.grid,

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::dem::Image;
 use crate::pyramid::feature::FeatureInput;
-use crate::pyramid::{PyramidError, SourceMetadata, VerticalReference};
+use crate::pyramid::{ColorCodec, PyramidError, SourceMetadata, VerticalReference};
 
 /// What a build is asked for.
 #[derive(Clone, Debug, Default)]
@@ -37,8 +37,10 @@ pub struct BuildOptions {
 /// Imagery to drape over the terrain.
 #[derive(Clone, Debug)]
 pub struct Imagery<'a> {
-    /// The picture; without an extent it is stretched over the elevation model.
-    pub image: &'a Image,
+    /// The pictures, later ones over earlier ones; one without an extent is stretched over the elevation model.
+    pub images: &'a [Image],
+    /// How its tiles are stored.
+    pub codec: ColorCodec,
     /// Its files.
     pub sources: Vec<SourceMetadata>,
 }

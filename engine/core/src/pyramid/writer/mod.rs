@@ -12,6 +12,7 @@
 //! finished; a second run takes over what is there. Knows files and bytes; knows no heights.
 
 mod block;
+mod copy;
 mod place;
 
 use std::{
@@ -26,15 +27,16 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use self::{
-    block::Block,
+    block::{Block, Packing},
     place::{claim, remove_if_there, settle_replacement, start_over},
 };
 use super::{
-    COLOR_TEXELS, Metadata, PyramidError, RecordLayout,
+    COLOR_TEXELS, ColorCodec, Metadata, PyramidError, RecordLayout,
     files::{remove_folder, sibling, sync_folder, write_whole, write_whole_with},
     shard::shard_count,
     zarr,
 };
+use crate::geo::TileId;
 
 pub use block::Contents;
 pub(super) use place::check_target;
@@ -144,33 +146,50 @@ impl PyramidWriter {
             tiles,
             shard,
             chunk_bytes: layout.byte_count(),
-            sections: layout.sections(),
+            packing: Packing::Record(layout.sections()),
         };
         self.write_block(key, &block, records)
     }
 
-    /// Writes one block of a level's imagery: RGBA texels, 256 × 256 a tile, row by row from the north-west.
+    /// Writes one block of a level's imagery: RGBA texels, 256 × 256 a tile, row by row from the north-west. There are
+    /// two shards where the codec stores alpha apart; `texels` is then asked twice.
     ///
     /// # Errors
     ///
     /// As [`Self::write_shard`].
     pub fn write_color_shard(
         &self,
+        codec: ColorCodec,
         level: u8,
         tiles: [u32; 2],
         shard: [u32; 2],
         texels: Contents<'_>,
-    ) -> Result<ShardInfo, PyramidError> {
-        let key = zarr::shard_key(&format!("color/{level}"), shard, 3);
-        let chunk_bytes = COLOR_TEXELS * COLOR_TEXELS * 4;
-        let block = Block {
+    ) -> Result<Vec<ShardInfo>, PyramidError> {
+        let block = |chunk_bytes, packing| Block {
             level,
             tiles,
             shard,
             chunk_bytes,
-            sections: Vec::new(),
+            packing,
         };
-        self.write_block(key, &block, texels)
+        let key = zarr::shard_key(&format!("color/{level}"), shard, 3);
+        let count = COLOR_TEXELS * COLOR_TEXELS;
+        let ColorCodec::Jpeg { quality } = codec else {
+            let written = self.write_block(key, &block(4 * count, Packing::Whole), texels)?;
+            return Ok(vec![written]);
+        };
+        let alpha = |tile: TileId| {
+            let alpha = texels(tile)?.map(|texels| {
+                let alpha = texels.as_chunks::<4>().0.iter().map(|texel| texel[3]);
+                alpha.collect::<Vec<u8>>()
+            });
+            Ok(alpha.filter(|alpha| alpha.iter().any(|alpha| *alpha < u8::MAX)))
+        };
+        let alpha_key = zarr::shard_key(&format!("alpha/{level}"), shard, 2);
+        Ok(vec![
+            self.write_block(key, &block(4 * count, Packing::Jpeg(quality)), texels)?,
+            self.write_block(alpha_key, &block(count, Packing::Whole), &alpha)?,
+        ])
     }
 
     /// Writes one block of the features' records, each of `record_bytes`; tiles without a feature have none.
@@ -192,7 +211,7 @@ impl PyramidWriter {
             tiles,
             shard,
             chunk_bytes: record_bytes as usize,
-            sections: Vec::new(),
+            packing: Packing::Whole,
         };
         self.write_block(key, &block, records)
     }
@@ -278,32 +297,9 @@ impl PyramidWriter {
     }
 
     fn write_nodes(&self, metadata: &Metadata) -> Result<(), PyramidError> {
-        let node =
-            |name: &str, text: &[u8]| write_whole(&self.folder.join(name).join(zarr::NODE), text);
-        node("tile", &zarr::group_json())?;
-        for (index, level) in metadata.levels.iter().enumerate() {
-            node(
-                &format!("tile/{index}"),
-                &zarr::tile_array_json(level.tiles, &RecordLayout::new(level)),
-            )?;
-        }
-        if let Some(features) = &metadata.features {
-            node("feature", &zarr::group_json())?;
-            node(
-                &format!("feature/{}", features.level),
-                &zarr::feature_array_json(metadata.grid.tiles(features.level), features),
-            )?;
-        }
-        let Some(color) = &metadata.color else {
-            return Ok(());
-        };
-        node("color", &zarr::group_json())?;
-        (0..color.levels).try_for_each(|level| {
-            node(
-                &format!("color/{level}"),
-                &zarr::color_array_json(metadata.grid.tiles(level)),
-            )
-        })
+        zarr::nodes(metadata)
+            .iter()
+            .try_for_each(|(key, text)| write_whole(&self.folder.join(key), text))
     }
 
     fn write_manifest(&self, shards: &[ShardInfo]) -> Result<(), PyramidError> {
@@ -378,13 +374,18 @@ pub(super) fn shard_keys(metadata: &Metadata) -> impl Iterator<Item = String> {
             })
         })
     };
-    let color_levels = metadata.color.as_ref().map_or(0, |color| color.levels);
+    let color = metadata.color.as_ref();
+    let color_levels = color.map_or(0, |color| color.levels);
+    let alpha_levels = color
+        .filter(|color| color.codec != ColorCodec::Zstd)
+        .map_or(0, |color| color.levels);
     let features = metadata
         .features
         .map_or(0..0, |features| features.level..features.level + 1);
     arrays("tile", 0..metadata.grid.level_count(), 1)
         .chain(arrays("feature", features, 1))
         .chain(arrays("color", 0..color_levels, 3))
+        .chain(arrays("alpha", 0..alpha_levels, 2))
 }
 
 /// Size and BLAKE3 of a file.
