@@ -17,16 +17,19 @@ use drumlin_core::{
 use drumlin_terminal::{outcome::Outcome, print, size};
 use serde_json::{Value, json};
 
-use crate::{cage, interrupt, progress::Progress, sources};
+use crate::{cage, input_list, interrupt, progress::Progress, sources};
 
 /// Bytes of decoded strips and tiles kept of all inputs together.
 const CACHE_BYTES: u64 = 64 << 20;
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct Arguments {
     /// GeoTIFF, SRTM .hgt, 16-bit PNG or EXR; where several overlap, the later one wins
-    #[arg(value_name = "INPUT", required = true)]
+    #[arg(value_name = "INPUT", required_unless_present = "input_list")]
     inputs: Vec<PathBuf>,
+    /// A text file that names more inputs, one a line, relative to the file; lines that start with # are left out
+    #[arg(long, value_name = "FILE")]
+    input_list: Option<PathBuf>,
     /// The pyramid to make: a folder, which appears when it is whole
     #[arg(short, long, value_name = "OUT.zarr")]
     output: PathBuf,
@@ -80,6 +83,11 @@ enum Vertical {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
     let cancel = interrupt::flag()?;
+    let mut arguments = arguments.clone();
+    if let Some(list) = &arguments.input_list {
+        arguments.inputs.extend(input_list::read(list)?);
+    }
+    let arguments = &arguments;
     let raster = open(arguments)?;
     let image = arguments
         .imagery

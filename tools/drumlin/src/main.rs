@@ -9,6 +9,7 @@ mod cage;
 mod feature;
 mod height;
 mod info;
+mod input_list;
 mod interrupt;
 mod progress;
 mod sources;

@@ -16,7 +16,9 @@ mod errors;
 mod estimate;
 mod features;
 mod fit;
+mod graph;
 mod ground;
+mod journal;
 mod levels;
 mod measure;
 mod options;
@@ -29,6 +31,7 @@ mod records;
 mod samples;
 mod scale;
 mod scratch;
+mod tasks;
 #[cfg(test)]
 pub(crate) mod testing;
 #[cfg(test)]
@@ -44,13 +47,15 @@ pub use options::{BuildOptions, BuildReport, Imagery, Progress, Stage};
 
 use self::errors::Errors;
 use self::features::Features;
+use self::journal::{Journal, Made};
 use self::levels::Levels;
 use self::options::Watch;
 use self::plan::Shape;
 use self::records::Records;
 use self::scale::Scale;
-use super::{Metadata, PyramidError, PyramidWriter, ShardInfo, files::remove_folder};
-use crate::dem::Raster;
+use self::tasks::{Job, Tasks, Want};
+use super::{ColorMetadata, Metadata, PyramidError, PyramidWriter, ShardInfo};
+use crate::dem::{DemError, Raster};
 use crate::geo::Grid;
 
 /// The version of the builder's arithmetic: to be raised with every change after which the same input gives other
@@ -60,7 +65,7 @@ const BUILDER: u32 = 1;
 /// Builds a pyramid.
 ///
 /// `progress` is called often and from any thread. When `cancel` becomes true the build stops at the next window, block
-/// or shard; the shards it has written are kept by the next run with the same options, where sources are named.
+/// or shard; what it has done is kept by the next run with the same options, where sources are named.
 ///
 /// # Errors
 /// [`PyramidError::Refused`] for options that cannot be met or an output that is something else;
@@ -84,7 +89,15 @@ pub fn build(
         })?;
     let writer = PyramidWriter::resume(&options.output, options.overwrite, &plan.fingerprint)?;
     let watch = Watch::new(progress, cancel);
-    let made = pool.install(|| plan.run(raster, imagery, options, &writer, &watch));
+    let tasks = Tasks {
+        passes: graph::passes(raster, imagery, !options.features.is_empty()),
+        want: Want::Whole,
+        folder: writer.folder().to_owned(),
+        watch: &watch,
+        journal: Journal::new(writer.journal()),
+        done: AtomicBool::new(false),
+    };
+    let made = pool.install(|| plan.run(raster, imagery, options, &writer, &tasks));
     match made {
         Ok((metadata, shards, report)) => {
             writer.publish(&metadata, &shards)?;
@@ -94,13 +107,16 @@ pub fn build(
             })
         }
         Err(error) => {
-            let resumable = matches!(error, PyramidError::Interrupted | PyramidError::Io { .. });
-            // The first error is the one to tell; what cannot be removed now, the next run removes.
-            let _ = if resumable && !plan.fingerprint.is_empty() {
-                remove_folder(&writer.scratch())
-            } else {
-                writer.discard()
-            };
+            let resumable = matches!(
+                error,
+                PyramidError::Interrupted
+                    | PyramidError::Io { .. }
+                    | PyramidError::Dem(DemError::Io { .. })
+            );
+            if !resumable || plan.fingerprint.is_empty() {
+                // The first error is the one to tell; what cannot be removed now, the next run removes.
+                let _ = writer.discard();
+            }
             Err(error)
         }
     }
@@ -143,14 +159,13 @@ impl Plan {
         imagery: Option<&Imagery<'_>>,
         options: &BuildOptions,
         writer: &PyramidWriter,
-        watch: &Watch<'_>,
+        tasks: &Tasks<'_>,
     ) -> Result<(Metadata, Vec<ShardInfo>, BuildReport), PyramidError> {
         let (grid, unit) = (&self.grid, self.scale.unit());
         let scratch = writer.scratch();
-        remove_folder(&scratch)?;
-        let levels = Levels::new(raster, &self.scale, &self.shape, &scratch, watch)?;
+        let levels = Levels::new(raster, &self.scale, &self.shape, &scratch, tasks)?;
+        let errors = Errors::measure(&levels, grid, &scratch, tasks)?;
         let features = Features::new(&options.features, &levels, raster.header(), unit)?;
-        let errors = Errors::measure(&levels, grid, &scratch, watch)?;
         let records = Records {
             levels: &levels,
             errors: &errors,
@@ -158,17 +173,16 @@ impl Plan {
             grid,
             unit,
         };
-        let (mut shards, root) = records.write(writer, &scratch, watch)?;
-        remove_folder(&scratch)?;
+        let (mut shards, root_error) = records.write(writer, &scratch, tasks)?;
         let height_range = errors.height_range;
-        let mut report = self.report(options, &shards, f64::from(root.error));
+        let mut report = self.report(options, &shards, f64::from(root_error));
         report.void_samples = levels.void_count;
-        let feature_shards = features.write(grid, writer)?;
+        let feature_shards = features.write(grid, writer, tasks)?;
         report.features = features.count();
         report.feature_bytes = feature_shards.iter().map(|info| info.bytes).sum();
         shards.extend(feature_shards);
         let color = imagery
-            .map(|imagery| color::write(imagery, grid, writer, watch))
+            .map(|imagery| self.color(imagery, writer, tasks))
             .transpose()?
             .map(|(color, infos)| {
                 report.color_levels = color.levels;
@@ -190,6 +204,33 @@ impl Plan {
             sources: options.sources.clone(),
         };
         Ok((metadata, shards, report))
+    }
+
+    /// The imagery: one task, whose shards are kept by the writer where it is interrupted.
+    fn color(
+        &self,
+        imagery: &Imagery<'_>,
+        writer: &PyramidWriter,
+        tasks: &Tasks<'_>,
+    ) -> Result<(ColorMetadata, Vec<ShardInfo>), PyramidError> {
+        let job = Job {
+            pass: "color",
+            planes: &[],
+            in_turn: true,
+            advance: &|_| Ok(()),
+        };
+        let work = |()| {
+            let (color, shards) = color::write(imagery, &self.grid, writer, tasks.watch)?;
+            Ok(Made {
+                shards,
+                ..Made::new(Some(color), [])
+            })
+        };
+        let made = tasks.run(&job, |_| vec![()], work, Option::or)?;
+        let color = made.found.ok_or_else(|| {
+            PyramidError::Refused("the imagery of an earlier run was not understood".into())
+        })?;
+        Ok((color, made.shards))
     }
 
     fn report(&self, options: &BuildOptions, shards: &[ShardInfo], root_error: f64) -> BuildReport {

@@ -5,6 +5,7 @@
 //!                 manifest/journal.jsonl    a line a finished shard
 //!                 tile/…, color/…           shards, each written whole
 //!                 scratch/…                 what passes of the build leave for each other
+//!                 journal/…                 and what each of them has done
 //! publish:        array metadata, manifest, the root zarr.json, then the folder becomes OUT
 //! ```
 //!
@@ -31,7 +32,7 @@ use self::{
 };
 use super::{
     COLOR_TEXELS, Metadata, PyramidError, RecordLayout,
-    files::{remove_folder, sibling, sync_folder, write_whole, write_whole_with},
+    files::{remove_folder, sibling, sync_folder, unique, write_whole, write_whole_as},
     shard::shard_count,
     zarr,
 };
@@ -45,6 +46,8 @@ const MARKER: &str = "unfinished";
 const JOURNAL: &str = "manifest/journal.jsonl";
 /// What passes of the build leave for each other.
 const SCRATCH: &str = "scratch";
+/// What passes of the build have done.
+const PASSES: &str = "journal";
 /// One line a shard, when done.
 pub(super) const MANIFEST: &str = "manifest/shards.jsonl";
 
@@ -197,12 +200,23 @@ impl PyramidWriter {
         self.write_block(key, &block, records)
     }
 
-    /// The folder for what passes of the build leave for each other. Nothing in it outlives the run: whoever fills it
-    /// removes it when the run ends, however it does, and when it starts, for runs that were killed;
-    /// [`Self::publish`] leaves none.
+    /// The folder for what passes of the build leave for each other; it goes with what is started over, and when the
+    /// pyramid is published.
     #[must_use]
     pub fn scratch(&self) -> PathBuf {
         self.folder.join(SCRATCH)
+    }
+
+    /// The folder for what passes of the build have done, kept and removed with [`Self::scratch`].
+    #[must_use]
+    pub fn journal(&self) -> PathBuf {
+        self.folder.join(PASSES)
+    }
+
+    /// The folder of what is being built.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// Writes array metadata, manifest and root, and gives the pyramid its name.
@@ -219,10 +233,11 @@ impl PyramidWriter {
         check_complete(metadata, shards).map_err(invalid)?;
         self.write_nodes(metadata)?;
         self.write_manifest(shards)?;
-        remove_if_there(&self.folder.join(JOURNAL))?;
-        remove_folder(&self.scratch())?;
         let root = zarr::root_json(metadata).map_err(|error| invalid(error.to_string()))?;
         write_whole(&self.folder.join(zarr::NODE), &root)?;
+        remove_if_there(&self.folder.join(JOURNAL))?;
+        remove_folder(&self.scratch())?;
+        remove_folder(&self.journal())?;
         remove_if_there(&self.folder.join(MARKER))?;
         sync_folder(&self.folder)?;
         self.take_name()
@@ -245,13 +260,15 @@ impl PyramidWriter {
     ) -> Result<ShardInfo, PyramidError> {
         let path = self.folder.join(&key);
         if let Some(kept) = self.kept.get(&key)
-            && file_hash(&path)
-                .is_ok_and(|(bytes, hash)| bytes == kept.bytes && hash == kept.blake3)
+            && holds(&self.folder, kept)
         {
             return Ok(kept.clone());
         }
         let mut chunks = 0;
-        write_whole_with(&path, |file| {
+        // Under a name of its own, and not beside it: another process may write the same, and what a killed one leaves
+        // goes with the scratch.
+        let partial = self.scratch().join(format!("shard-{}", unique()));
+        write_whole_as(&path, &partial, |file| {
             chunks = block.write(file, &path, contents)?;
             Ok(())
         })?;
@@ -385,6 +402,12 @@ pub(super) fn shard_keys(metadata: &Metadata) -> impl Iterator<Item = String> {
     arrays("tile", 0..metadata.grid.level_count(), 1)
         .chain(arrays("feature", features, 1))
         .chain(arrays("color", 0..color_levels, 3))
+}
+
+/// True for a shard that is there as it was written.
+pub(super) fn holds(folder: &Path, info: &ShardInfo) -> bool {
+    file_hash(&folder.join(&info.key))
+        .is_ok_and(|(bytes, hash)| bytes == info.bytes && hash == info.blake3)
 }
 
 /// Size and BLAKE3 of a file.

@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use super::{MARKER, SCRATCH};
+use super::{MARKER, PASSES, SCRATCH};
 use crate::pyramid::{
     PyramidError,
     files::{remove_folder, sibling},
@@ -91,7 +91,7 @@ pub(super) fn start_over(
     marker: &mut File,
     fingerprint: &str,
 ) -> Result<(), PyramidError> {
-    for name in ["tile", "feature", "color", "manifest", SCRATCH] {
+    for name in ["tile", "feature", "color", "manifest", SCRATCH, PASSES] {
         remove_folder(&folder.join(name))?;
     }
     remove_if_there(&folder.join(zarr::NODE))?;
