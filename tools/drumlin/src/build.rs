@@ -9,7 +9,7 @@ use drumlin_core::{
     dem::{self, DemError, Image, Mosaic, OpenOptions, Raster},
     geo::CrsKind,
     pyramid::{
-        PyramidError, VerticalReference,
+        PyramidError, SourceMetadata, VerticalReference,
         build::{BuildOptions, BuildPlan, BuildReport, Imagery, build, plan},
         feature::FeatureInput,
     },
@@ -53,9 +53,10 @@ pub(crate) struct Arguments {
     /// Metres a unit of the stored numbers
     #[arg(long, value_name = "METRES")]
     scale: Option<f64>,
-    /// A picture to lay over the terrain (PNG, JPEG, TIFF): of the same CRS, or of none and then stretched
-    #[arg(long, value_name = "IMG")]
-    imagery: Option<PathBuf>,
+    /// Pictures to lay over the terrain (PNG, JPEG, TIFF): of the same CRS, or of none and then stretched; where several
+    /// overlap, the later one wins; where one has alpha, a mask or a value for nothing, what is under it shows
+    #[arg(long, value_name = "IMG", num_args = 1..)]
+    imagery: Vec<PathBuf>,
     /// Cages to lay into the finest level: OBJ with tags and a line "# drumlin position X Y Z"
     #[arg(long, value_name = "FILE", num_args = 1..)]
     features: Vec<PathBuf>,
@@ -89,18 +90,14 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
     }
     let arguments = &arguments;
     let raster = open(arguments)?;
-    let image = arguments
-        .imagery
-        .as_deref()
-        .map(|file| open_imagery(file, &*raster))
-        .transpose()?;
-    let imagery = match (&image, &arguments.imagery) {
-        (Some(image), Some(file)) => Some(Imagery {
-            image,
-            sources: vec![sources::describe(file)?],
-        }),
-        _ => None,
-    };
+    let images = arguments.imagery.iter();
+    let images: Vec<Image> = images
+        .map(|file| open_imagery(arguments, file, &*raster))
+        .collect::<Result<_>>()?;
+    let imagery = (!images.is_empty()).then_some(Imagery {
+        images: &images,
+        sources: describe(&arguments.imagery)?,
+    });
     let options = options(arguments)?;
     if arguments.dry_run {
         let plan = plan(&*raster, imagery.as_ref(), &options, &cancel)?;
@@ -127,11 +124,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
 }
 
 fn options(arguments: &Arguments) -> Result<BuildOptions> {
-    let sources: Result<Vec<_>> = arguments
-        .inputs
-        .iter()
-        .map(|file| sources::describe(file))
-        .collect();
     Ok(BuildOptions {
         output: arguments.output.clone(),
         overwrite: arguments.overwrite,
@@ -149,8 +141,12 @@ fn options(arguments: &Arguments) -> Result<BuildOptions> {
             .iter()
             .map(|file| feature(file))
             .collect::<Result<_>>()?,
-        sources: sources?,
+        sources: describe(&arguments.inputs)?,
     })
+}
+
+fn describe(files: &[PathBuf]) -> Result<Vec<SourceMetadata>> {
+    files.iter().map(|file| sources::describe(file)).collect()
 }
 
 /// Reads a cage and where it stands.
@@ -173,7 +169,7 @@ fn open(arguments: &Arguments) -> Result<Box<dyn Raster>> {
     let options = OpenOptions {
         spacing: arguments.spacing,
         scale: arguments.scale,
-        cache_bytes: cache_bytes(arguments),
+        cache_bytes: cache_bytes(arguments, arguments.inputs.len()),
         ..OpenOptions::default()
     };
     let mut rasters = Vec::new();
@@ -198,22 +194,25 @@ fn open(arguments: &Arguments) -> Result<Box<dyn Raster>> {
         .ok_or_else(|| PyramidError::Refused("no input".into()).into())
 }
 
-/// Bytes of decoded parts kept for each input: together no more than a quarter of the budget; of several inputs, no
-/// more than one has as a rule.
-fn cache_bytes(arguments: &Arguments) -> Option<usize> {
+/// Bytes of decoded parts kept for each of `count` inputs: together no more than a quarter of the budget; of several
+/// inputs, no more than one has as a rule.
+fn cache_bytes(arguments: &Arguments, count: usize) -> Option<usize> {
     let quarter = arguments.memory_budget.map(|budget| budget / 4);
-    let count = arguments.inputs.len() as u64;
     let each = if count > 1 {
-        Some(quarter.unwrap_or(CACHE_BYTES).min(CACHE_BYTES) / count)
+        Some(quarter.unwrap_or(CACHE_BYTES).min(CACHE_BYTES) / count as u64)
     } else {
         quarter
     };
     each.map(|bytes| usize::try_from(bytes).unwrap_or(usize::MAX))
 }
 
-/// Reads the picture; one that says where it lies must say so in the terrain's CRS.
-fn open_imagery(file: &Path, raster: &dyn Raster) -> Result<Image> {
-    let image = dem::open_image(file)?;
+/// Opens a picture; one that says where it lies must say so in the terrain's CRS.
+fn open_imagery(arguments: &Arguments, file: &Path, raster: &dyn Raster) -> Result<Image> {
+    let options = OpenOptions {
+        cache_bytes: cache_bytes(arguments, arguments.imagery.len()),
+        ..OpenOptions::default()
+    };
+    let image = dem::open_image(file, &options)?;
     let crs = &raster.header().crs;
     let known = image.extent.is_some() && image.crs.kind != CrsKind::Unknown;
     if known && !image.crs.same_as(crs) {

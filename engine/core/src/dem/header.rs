@@ -39,6 +39,27 @@ impl Window {
         u64::from(self.rows) * u64::from(self.columns)
     }
 
+    /// Checks it and a buffer of `len` samples against the rows and columns of what a file holds.
+    pub(crate) fn check(
+        self,
+        [rows, columns]: [u32; 2],
+        len: usize,
+        file: &str,
+    ) -> Result<(), DemError> {
+        let what = if self.row_end() > rows.into() || self.column_end() > columns.into() {
+            format!("a raster of {rows} x {columns}")
+        } else if u64::try_from(len) != Ok(self.sample_count()) {
+            format!("a buffer of {len} samples")
+        } else {
+            return Ok(());
+        };
+        Err(DemError::Window {
+            file: file.into(),
+            window: self,
+            what,
+        })
+    }
+
     /// One past its last row.
     pub(crate) fn row_end(&self) -> u64 {
         u64::from(self.row) + u64::from(self.rows)
@@ -80,21 +101,8 @@ pub struct RasterHeader {
 impl RasterHeader {
     /// Checks a window and a buffer against the grid.
     pub(crate) fn check(&self, window: Window, len: usize) -> Result<(), DemError> {
-        let grid = &self.grid;
-        let what = if window.row_end() > u64::from(grid.rows)
-            || window.column_end() > u64::from(grid.columns)
-        {
-            format!("a raster of {} x {}", grid.rows, grid.columns)
-        } else if u64::try_from(len) != Ok(window.sample_count()) {
-            format!("a buffer of {len} samples")
-        } else {
-            return Ok(());
-        };
-        Err(DemError::Window {
-            file: self.source.name.clone(),
-            window,
-            what,
-        })
+        let size = [self.grid.rows, self.grid.columns];
+        window.check(size, len, &self.source.name)
     }
 }
 

@@ -79,7 +79,7 @@ impl Raster for Memory {
     fn read(&self, window: Window, out: &mut [f64]) -> Result<(), DemError> {
         self.header.check(window, out.len())?;
         let grid = &self.header.grid;
-        let stored = self.flip.stored(window, grid);
+        let stored = self.flip.stored(window, [grid.rows, grid.columns]);
         for (row, out) in
             (stored.row as usize..).zip(out.chunks_exact_mut(stored.columns.max(1) as usize))
         {

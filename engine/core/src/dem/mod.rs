@@ -39,7 +39,7 @@ use self::tiff::{Ifd, Tiff};
 pub use error::DemError;
 pub use geotiff::{Compression, GeoTiffLayout, GeoTiffWriter, TIFF_TILE, write_raster};
 pub use header::{OpenOptions, RasterHeader, SourceInfo, Window};
-pub use image::{Image, open_image};
+pub use image::{Image, Pixel, open_image};
 pub use mosaic::Mosaic;
 pub use synth::{SPACING as SYNTH_SPACING, Synth};
 

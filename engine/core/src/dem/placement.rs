@@ -94,29 +94,21 @@ impl Placement {
 }
 
 impl Flip {
-    /// Where a window of the grid lies in the file.
-    pub(super) fn stored(self, window: Window, grid: &Grid) -> Window {
+    /// Where a window of so many rows and columns lies in the file.
+    pub(super) fn stored(self, window: Window, [rows, columns]: [u32; 2]) -> Window {
         let mut stored = window;
         if self.rows {
-            stored.row = grid.rows - window.row - window.rows;
+            stored.row = rows - window.row - window.rows;
         }
         if self.columns {
-            stored.column = grid.columns - window.column - window.columns;
+            stored.column = columns - window.column - window.columns;
         }
         stored
     }
 
     /// Turns the samples of a stored window, in place.
-    pub(super) fn turn(self, window: Window, samples: &mut [f64]) {
-        self.turn_rows(window.columns as usize, samples);
-    }
-
-    /// Turns an image's pixels, in place.
-    pub(super) fn turn_pixels(self, width: u32, pixels: &mut [[u8; 3]]) {
-        self.turn_rows(width as usize, pixels);
-    }
-
-    fn turn_rows<T>(self, columns: usize, samples: &mut [T]) {
+    pub(super) fn turn<T>(self, window: Window, samples: &mut [T]) {
+        let columns = window.columns as usize;
         if self.columns {
             samples
                 .chunks_exact_mut(columns.max(1))
@@ -146,7 +138,7 @@ mod tests {
             step,
         };
         let (grid, flip) = placement.grid(Path::new("x"), 2, 3).expect("a fine grid");
-        let stored = flip.stored(window, &grid);
+        let stored = flip.stored(window, [grid.rows, grid.columns]);
         let mut out = Vec::new();
         for row in stored.row..stored.row + stored.rows {
             out.extend(

@@ -67,7 +67,8 @@ impl Raster for Plain {
 
     fn read(&self, window: Window, out: &mut [f64]) -> Result<(), DemError> {
         self.header.check(window, out.len())?;
-        let stored = self.flip.stored(window, &self.header.grid);
+        let size = [self.header.grid.rows, self.header.grid.columns];
+        let stored = self.flip.stored(window, size);
         let Rows {
             offset,
             stride,

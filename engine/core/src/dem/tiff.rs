@@ -18,7 +18,7 @@ pub(super) use self::ifd::Ifd;
 pub(super) use self::ifd::tag;
 use self::mask::Mask;
 use self::metadata::BandMetadata;
-pub(super) use self::picture::read_picture;
+pub(super) use self::picture::Picture;
 use self::table::Table;
 use super::bytes::Bytes;
 use super::placement::{Flip, Placement};
@@ -79,7 +79,8 @@ impl Raster for Tiff {
 
     fn read(&self, window: Window, out: &mut [f64]) -> Result<(), DemError> {
         self.header.check(window, out.len())?;
-        let stored = self.flip.stored(window, &self.header.grid);
+        let size = [self.header.grid.rows, self.header.grid.columns];
+        let stored = self.flip.stored(window, size);
         self.chunks.visit(&self.bytes, stored, |run| {
             let out = &mut out[run.in_window];
             match run.part {
@@ -88,7 +89,7 @@ impl Raster for Tiff {
             }
         })?;
         if let Some(mask) = &self.mask {
-            mask.apply(&self.bytes, stored, out)?;
+            mask.apply(&self.bytes, stored, f64::NAN, out)?;
         }
         self.flip.turn(window, out);
         Ok(())

@@ -25,16 +25,48 @@ pub(crate) static LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| {
     table
 });
 
+/// Steps in which stored values are looked up: finer than any two of them are apart (1 / 3295 near black).
+const STEPS: usize = 4096;
+
+/// For every step of light the least stored value that is nearest to some light of it, and for every value the least
+/// light to which the next one is nearer. So that within a step at most one value follows.
+static NEAREST: LazyLock<([u8; STEPS], [f32; 256])> = LazyLock::new(|| {
+    let mut limits = [f32::INFINITY; 256];
+    for (below, limit) in limits[..255].iter_mut().enumerate() {
+        // Floats of one sign are in the order of their bits.
+        let (mut low, mut high) = (LINEAR[below].to_bits(), LINEAR[below + 1].to_bits());
+        while high - low > 1 {
+            let middle = low.midpoint(high);
+            let light = f32::from_bits(middle);
+            if light - LINEAR[below] < LINEAR[below + 1] - light {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        *limit = f32::from_bits(high);
+    }
+    let mut values = [0; STEPS];
+    for (step, value) in values.iter_mut().enumerate() {
+        // The product that finds the step is rounded, by less than this.
+        let light = step as f32 / (STEPS - 1) as f32 * (1.0 - 4.0 * f32::EPSILON);
+        let nearest = limits.partition_point(|limit| *limit <= light);
+        *value = u8::try_from(nearest).unwrap_or(u8::MAX);
+    }
+    (values, limits)
+});
+
 /// The stored value whose light is nearest.
 pub(crate) fn encode(light: f32) -> u8 {
-    let above = LINEAR.partition_point(|linear| *linear < light).min(255);
-    let below = above.saturating_sub(1);
-    let nearest = if light - LINEAR[below] < LINEAR[above] - light {
-        below
-    } else {
-        above
-    };
-    u8::try_from(nearest).unwrap_or(u8::MAX)
+    let (values, limits) = &*NEAREST;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "less than 0 becomes 0"
+    )]
+    let step = (light * (STEPS - 1) as f32) as usize;
+    let value = values[step.min(STEPS - 1)];
+    value + u8::from(light >= limits[usize::from(value)])
 }
 
 #[cfg(test)]
@@ -44,6 +76,19 @@ mod tests {
     #[test]
     fn every_stored_value_survives_linear_light() {
         assert!((0..=255_u8).all(|value| encode(LINEAR[usize::from(value)]) == value));
+    }
+
+    #[test]
+    fn every_light_becomes_the_value_it_is_nearest_to() {
+        for step in 0..=300_000_u32 {
+            let light = f64::from(step) / 300_000.0;
+            #[expect(clippy::cast_possible_truncation, reason = "a test's light")]
+            let value = encode(light as f32);
+            let far = |value: u8| (f64::from(LINEAR[usize::from(value)]) - light).abs();
+            for other in [value.saturating_sub(1), value.saturating_add(1)] {
+                assert!(far(value) <= far(other) + 1e-7, "{light} is not {value}");
+            }
+        }
     }
 
     #[test]

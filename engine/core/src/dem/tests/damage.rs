@@ -12,8 +12,8 @@ use ::tiff::encoder::{Compression, DeflateLevel, Predictor, TiffKindBig, TiffKin
 use tempfile::TempDir;
 
 use super::super::*;
-use super::read_all;
 use super::written::{COLUMNS, ROWS, hill, save, tiff};
+use super::{pixels, read_all};
 
 /// One small sound file of each format.
 fn files() -> Vec<(&'static str, Vec<u8>)> {
@@ -128,7 +128,7 @@ fn usgs() -> Vec<u8> {
 fn try_all(path: &Path) -> bool {
     let path = path.to_owned();
     catch_unwind(|| {
-        let _ = open_image(&path);
+        let _ = pixels(&path);
         open(&path, &OpenOptions::default()).and_then(|raster| {
             // A damaged size may still be allowed; only small ones are read whole.
             let small = Window::whole(&raster.header().grid).sample_count() < 1 << 22;
@@ -249,7 +249,7 @@ fn absurd_sizes_are_refused_before_memory_is_taken() {
     }
     file[29..33].copy_from_slice(&(!crc).to_be_bytes());
     assert!(error("a.png", &file).contains("limit"));
-    let image = open_image(&save(&folder, "b.png", &file)).expect_err("too large");
+    let image = pixels(&save(&folder, "b.png", &file)).expect_err("too large");
     assert!(image.to_string().contains("limit"), "{image}");
 }
 

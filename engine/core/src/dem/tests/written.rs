@@ -10,7 +10,7 @@ use ::tiff::tags::Tag;
 use tempfile::TempDir;
 
 use super::super::*;
-use super::read_all;
+use super::{pixels, read_all};
 
 pub(super) const COLUMNS: u32 = 23;
 pub(super) const ROWS: u32 = 17;
@@ -271,8 +271,84 @@ fn a_rows_from_the_south_world_file_turns_an_image() {
     let path = folder.path().join("a.png");
     image.save(&path).expect("a PNG");
     save(&folder, "a.pgw", b"2 0 0 2 11 21");
-    let image = open_image(&path).expect("readable");
-    assert_eq!(image.rgb, [[4, 5, 6], [1, 2, 3]]);
+    let image = open_image(&path, &OpenOptions::default()).expect("readable");
+    let all = pixels(&path).expect("readable");
+    assert_eq!(all, [[4, 5, 6, 255], [1, 2, 3, 255]]);
     let extent = image.extent.expect("placed");
     assert_eq!((extent.min, extent.max), ([10.0, 20.0], [12.0, 24.0]));
+}
+
+/// A TIFF of 3 × 2 pixels of 8 bits, four bands and so much else.
+fn small_tiff(extra: Option<u16>, nodata: Option<&str>) -> Vec<u8> {
+    let pixels: Vec<u8> = (0..3 * 2)
+        .flat_map(|at| [40 * at, 10, 20, if at == 4 { 128 } else { 255 * (at % 2) }])
+        .collect();
+    let mut file = Cursor::new(Vec::new());
+    let mut encoder = TiffEncoder::new(&mut file).expect("a header");
+    let mut image = encoder
+        .new_image::<colortype::RGBA8>(3, 2)
+        .expect("an image");
+    image.rows_per_strip(1).expect("before any strip");
+    let mut tag = |tag: u16, values: &[u16]| {
+        image
+            .encoder()
+            .write_tag(Tag::Unknown(tag), values)
+            .expect("a tag");
+    };
+    tag(338, &[extra.unwrap_or(0)]);
+    if let Some(nodata) = nodata {
+        image
+            .encoder()
+            .write_tag(Tag::Unknown(42113), nodata)
+            .expect("a tag");
+    }
+    image.write_data(&pixels).expect("pixels");
+    file.into_inner()
+}
+
+#[test]
+fn a_picture_has_nothing_where_its_alpha_or_its_value_for_nothing_says_so() {
+    let folder = TempDir::new().expect("a folder");
+    let read = |extra, nodata| {
+        let path = save(&folder, "a.tif", &small_tiff(extra, nodata));
+        pixels(&path).expect("readable")
+    };
+    assert_eq!(
+        read(None, None)[2..4],
+        [[80, 10, 20, 255], [120, 10, 20, 255]]
+    );
+    let straight = read(Some(2), None);
+    assert_eq!(
+        straight[2..5],
+        [[0; 4], [120, 10, 20, 255], [160, 10, 20, 128]]
+    );
+    assert_eq!(read(Some(1), None)[4], [255, 20, 40, 128]);
+    // All colours must have the value.
+    assert!(read(None, Some("10")).iter().all(|pixel| pixel[3] == 255));
+    let grey = ::image::GrayImage::from_raw(2, 1, vec![7, 8]).expect("two pixels");
+    let path = folder.path().join("grey.png");
+    grey.save(&path).expect("a PNG");
+    assert_eq!(
+        pixels(&path).expect("readable"),
+        [[7, 7, 7, 255], [8, 8, 8, 255]]
+    );
+}
+
+#[test]
+fn windows_of_a_picture_are_parts_of_the_whole_and_no_larger() {
+    let folder = TempDir::new().expect("a folder");
+    let path = save(&folder, "a.tif", &small_tiff(None, None));
+    let image = open_image(&path, &OpenOptions::default()).expect("readable");
+    let window = Window {
+        row: 1,
+        column: 1,
+        rows: 1,
+        columns: 2,
+    };
+    let mut part = [[0; 4]; 2];
+    image.read(window, &mut part).expect("inside");
+    assert_eq!(part, pixels(&path).expect("readable")[4..]);
+    assert!(image.read(window, &mut [[0; 4]; 3]).is_err());
+    let outside = image.read(Window { row: 2, ..window }, &mut part);
+    assert!(matches!(outside, Err(DemError::Window { .. })));
 }

@@ -6,10 +6,12 @@ use super::super::{DemError, OpenOptions, Window, bytes::Bytes, cache::Cache, sa
 use super::chunk::Coding;
 use super::table::Table;
 
-/// The strips or tiles of an image of one band.
+/// The strips or tiles of an image, of which samples of one band or pixels are made.
 pub(super) struct Chunks {
     pub(super) coding: Coding,
     pub(super) table: Table,
+    /// Bytes of a strip or tile once it is decoded.
+    part_bytes: u64,
     cache: Cache,
 }
 
@@ -31,20 +33,30 @@ impl Chunks {
         usual_bytes: usize,
         options: &OpenOptions,
     ) -> Self {
-        let budget = options.kept_bytes(usual_bytes, table.chunk_bytes(&coding));
+        let part_bytes = table.chunk_bytes(&coding);
+        Self::of_parts(coding, table, part_bytes, usual_bytes, options)
+    }
+
+    /// The same of strips or tiles that become so many bytes.
+    pub(super) fn of_parts(
+        coding: Coding,
+        table: Table,
+        part_bytes: u64,
+        usual_bytes: usize,
+        options: &OpenOptions,
+    ) -> Self {
+        let budget = options.kept_bytes(usual_bytes, part_bytes);
         Self {
             coding,
             table,
+            part_bytes,
             cache: Cache::new(budget),
         }
     }
 
     /// Bytes of decoded strips or tiles that are kept at most.
     pub(super) fn memory_bytes(&self) -> u64 {
-        let (budget, part) = (
-            self.cache.budget_bytes() as u64,
-            self.table.chunk_bytes(&self.coding),
-        );
+        let (budget, part) = (self.cache.budget_bytes() as u64, self.part_bytes);
         if part > budget {
             return 0;
         }
@@ -53,7 +65,7 @@ impl Chunks {
 
     /// Bytes that a window takes while it is read: one strip or tile decoded, and what it is decoded from, twice.
     pub(super) fn read_bytes(&self) -> u64 {
-        self.table.chunk_bytes(&self.coding) + 2 * self.table.most_stored_bytes()
+        self.part_bytes + 2 * self.table.most_stored_bytes()
     }
 
     /// Visits every sample of a stored window once, in rows.
@@ -61,6 +73,17 @@ impl Chunks {
         &self,
         bytes: &Bytes,
         window: Window,
+        visit: impl FnMut(Run<'_>),
+    ) -> Result<(), DemError> {
+        let decode = |index, place| self.table.decode(bytes, &self.coding, index, place);
+        self.visit_decoded(window, decode, visit)
+    }
+
+    /// The same where `decode` makes a strip or tile, given its index and where it lies in the file.
+    pub(super) fn visit_decoded(
+        &self,
+        window: Window,
+        decode: impl Fn(usize, (u64, u64)) -> Result<Samples, DemError>,
         mut visit: impl FnMut(Run<'_>),
     ) -> Result<(), DemError> {
         if window.sample_count() == 0 {
@@ -69,7 +92,7 @@ impl Chunks {
         let (rows, columns) = (self.table.chunk_rows, self.table.chunk_columns);
         for row in window.row / rows..=(window.row + window.rows - 1) / rows {
             for column in window.column / columns..=(window.column + window.columns - 1) / columns {
-                self.visit_chunk(bytes, [row, column], window, &mut visit)?;
+                self.visit_chunk([row, column], window, &decode, &mut visit)?;
             }
         }
         Ok(())
@@ -77,16 +100,15 @@ impl Chunks {
 
     fn visit_chunk(
         &self,
-        bytes: &Bytes,
         [row, column]: [u32; 2],
         window: Window,
+        decode: impl Fn(usize, (u64, u64)) -> Result<Samples, DemError>,
         visit: &mut impl FnMut(Run<'_>),
     ) -> Result<(), DemError> {
         let (rows, columns) = (self.table.chunk_rows, self.table.chunk_columns);
         let index = row as usize * self.table.across() as usize + column as usize;
-        let decode = |place| self.table.decode(bytes, &self.coding, index, place);
         let part = match self.table.place(index) {
-            Some(place) => Some(self.cache.get(index, || decode(place))?),
+            Some(place) => Some(self.cache.get(index, || decode(index, place))?),
             None => None,
         };
         let first = [

@@ -77,12 +77,13 @@ impl Mask {
         self.0.read_bytes() + samples.div_ceil(4)
     }
 
-    /// Makes void what it masks out of a stored window.
-    pub(super) fn apply(
+    /// Puts `nothing` in the place of what it masks out of a stored window.
+    pub(super) fn apply<T: Copy>(
         &self,
         bytes: &Bytes,
         window: Window,
-        out: &mut [f64],
+        nothing: T,
+        out: &mut [T],
     ) -> Result<(), DemError> {
         if window.sample_count() == 0 {
             return Ok(());
@@ -103,9 +104,9 @@ impl Mask {
         })?;
         let rows = bits.chunks_exact(packed.columns as usize);
         for (bits, out) in rows.zip(out.chunks_exact_mut(window.columns as usize)) {
-            for (column, height) in (window.column - 8 * first..).zip(out) {
+            for (column, sample) in (window.column - 8 * first..).zip(out) {
                 if (bits[column as usize / 8] << (column % 8)) & 0x80 == 0 {
-                    *height = f64::NAN;
+                    *sample = nothing;
                 }
             }
         }

@@ -1,15 +1,23 @@
-//! TIFF imagery: all bands of all strips or tiles, as RGB of 8 bits.
+//! TIFF imagery: strips or tiles of any usual bands, as RGB and alpha of 8 bits, decoded when a window asks for them.
 
 use std::io::Cursor;
 
 use ::image::codecs::jpeg::JpegDecoder;
 use ::image::{DynamicImage, ImageDecoder};
 
+use super::super::image::Pixel;
 use super::super::samples::Samples;
-use super::super::{DemError, bytes::Bytes, image::check_size};
+use super::super::{DemError, OpenOptions, Window, bytes::Bytes};
+use super::CACHE_BYTES;
 use super::chunk::{Coding, JPEG};
+use super::chunks::Chunks;
 use super::ifd::{Ifd, tag};
+use super::mask::Mask;
+use super::metadata;
 use super::table::Table;
+
+/// Bytes of a pixel as it is handed out.
+const PIXEL_BYTES: u64 = size_of::<Pixel>() as u64;
 
 /// What the bands of an image mean.
 #[derive(Clone, Debug)]
@@ -18,21 +26,283 @@ enum Colors {
     Grey,
     /// One band, white at 0.
     InverseGrey,
-    /// Three bands, and perhaps more that are passed over.
+    /// Three bands.
     Rgb,
     /// One band of indices into colours.
     Palette(Vec<[u8; 3]>),
 }
 
-/// Width, height and pixels in stored order.
-pub(in super::super) fn read_picture(
-    bytes: &Bytes,
-    ifd: &Ifd,
-) -> Result<(u32, u32, Vec<[u8; 3]>), DemError> {
-    let bands = ifd.short(bytes, tag::SAMPLES, 1)?;
-    let colors = read_colors(bytes, ifd, bands)?;
-    let apart = bands > 1 && ifd.short(bytes, tag::PLANAR, 1)? == 2;
-    let coding = Coding::read(bytes, ifd, if apart { 1 } else { bands })?;
+/// A band that says how much there is of a pixel.
+#[derive(Clone, Copy, Debug)]
+struct Alpha {
+    band: usize,
+    /// True when the colours are multiplied with it.
+    associated: bool,
+}
+
+/// An open image.
+pub(in super::super) struct Picture {
+    bytes: Bytes,
+    chunks: Chunks,
+    mask: Option<Mask>,
+    bands: Bands,
+    jpeg_tables: Option<Vec<u8>>,
+}
+
+/// How numbers become colours.
+#[derive(Debug)]
+struct Bands {
+    colors: Colors,
+    alpha: Option<Alpha>,
+    /// The number that all colours' bands have where there is nothing.
+    nothing: Option<u16>,
+    /// Bands that lie apart, each in strips or tiles of its own.
+    apart: bool,
+}
+
+impl Picture {
+    /// Reads all but the pixels.
+    pub(in super::super) fn open(
+        bytes: Bytes,
+        ifd: &Ifd,
+        options: &OpenOptions,
+    ) -> Result<Self, DemError> {
+        let count = ifd.short(&bytes, tag::SAMPLES, 1)?;
+        let bands = Bands::read(&bytes, ifd, count)?;
+        let coding = Coding::read(&bytes, ifd, if bands.apart { 1 } else { count })?;
+        check_coding(&bytes, &coding, &bands, count)?;
+        let table = Table::read(&bytes, ifd, &coding, if bands.apart { count } else { 1 })?;
+        let mask = Mask::find(&bytes, ifd, &table, options)?;
+        let pixels = u64::from(table.chunk_rows) * u64::from(table.chunk_columns);
+        let chunks = Chunks::of_parts(coding, table, pixels * PIXEL_BYTES, CACHE_BYTES, options);
+        Ok(Self {
+            jpeg_tables: ifd.raw(&bytes, tag::JPEG_TABLES)?,
+            bytes,
+            chunks,
+            mask,
+            bands,
+        })
+    }
+
+    /// Rows and columns of pixels.
+    pub(in super::super) fn size(&self) -> [u32; 2] {
+        [self.chunks.table.height, self.chunks.table.width]
+    }
+
+    /// Rows and columns of a strip or tile.
+    pub(in super::super) fn part_shape(&self) -> [u32; 2] {
+        [
+            self.chunks.table.chunk_rows,
+            self.chunks.table.chunk_columns,
+        ]
+    }
+
+    /// Bytes of decoded strips or tiles that are kept at most.
+    pub(in super::super) fn memory_bytes(&self) -> u64 {
+        let mask = self.mask.as_ref().map_or(0, Mask::memory_bytes);
+        self.chunks.memory_bytes() + mask
+    }
+
+    /// Bytes that a window of so many pixels takes while it is read.
+    pub(in super::super) fn read_bytes(&self, pixels: u64) -> u64 {
+        // All its bands decoded, and the pixels made of them.
+        let planes = if self.bands.apart { 4 } else { 1 };
+        let decoded = self.chunks.table.chunk_bytes(&self.chunks.coding);
+        let mask = self.mask.as_ref().map_or(0, |mask| mask.read_bytes(pixels));
+        (self.chunks.read_bytes() + planes * decoded).max(mask)
+    }
+
+    /// Reads a window of pixels as they are stored; alpha is 0 where the file leaves a part out.
+    pub(in super::super) fn read(&self, window: Window, out: &mut [Pixel]) -> Result<(), DemError> {
+        let decode = |index, place| self.decode(index, place);
+        self.chunks.visit_decoded(window, decode, |run| {
+            let out = &mut out[run.in_window];
+            match run.part {
+                Some(Samples::U8(part)) => {
+                    let (pixels, _) = part.as_chunks();
+                    out.copy_from_slice(&pixels[run.in_part..run.in_part + out.len()]);
+                }
+                _ => out.fill(Pixel::default()),
+            }
+        })?;
+        match &self.mask {
+            Some(mask) => mask.apply(&self.bytes, window, Pixel::default(), out),
+            None => Ok(()),
+        }
+    }
+
+    /// The pixels of a strip or tile, four bytes each.
+    fn decode(&self, index: usize, place: (u64, u64)) -> Result<Samples, DemError> {
+        if self.chunks.coding.compression == JPEG {
+            return self.decode_jpeg(index, place);
+        }
+        let table = &self.chunks.table;
+        let mut planes = Vec::new();
+        for plane in self.bands.planes() {
+            let index = plane * table.plane_len() + index;
+            let place = table.place(index).ok_or_else(|| {
+                table.damaged(
+                    &self.bytes,
+                    index,
+                    "is left out, but not those of other bands",
+                )
+            })?;
+            planes.push(table.decode(&self.bytes, &self.chunks.coding, index, place)?);
+        }
+        let count = table.stored_rows(index) as usize * table.chunk_columns as usize;
+        let bands = usize::from(self.chunks.coding.bands);
+        let (pixels, planes) = (0..count, &planes);
+        let pixels: Vec<Pixel> = match &planes[0] {
+            Samples::U8(_) => {
+                let number = |band: usize, at: usize| match planes.get(band) {
+                    Some(Samples::U8(plane)) => plane.get(at).copied().unwrap_or(0).into(),
+                    _ => 0,
+                };
+                let level = |number: u16| u8::try_from(number).unwrap_or(u8::MAX);
+                pixels
+                    .map(|at| self.bands.pixel(at, bands, number, level))
+                    .collect()
+            }
+            _ => {
+                let number = |band: usize, at: usize| match planes.get(band) {
+                    Some(Samples::U16(plane)) => plane.get(at).copied().unwrap_or(0),
+                    _ => 0,
+                };
+                pixels
+                    .map(|at| self.bands.pixel(at, bands, number, to_8_bits))
+                    .collect()
+            }
+        };
+        Ok(Samples::U8(pixels.into_flattened()))
+    }
+
+    fn decode_jpeg(&self, index: usize, place: (u64, u64)) -> Result<Samples, DemError> {
+        let table = &self.chunks.table;
+        let stored = table.stored(&self.bytes, &self.chunks.coding, index, place)?;
+        let damaged = |what: &str| table.damaged(&self.bytes, index, what);
+        let file = match self.jpeg_tables.as_deref() {
+            // Both are whole JPEG files: the end mark of one and the start mark of the other go.
+            Some([tables @ .., _, _]) => [tables, stored.get(2..).unwrap_or_default()].concat(),
+            _ => stored,
+        };
+        let decoder =
+            JpegDecoder::new(Cursor::new(file)).map_err(|error| damaged(&error.to_string()))?;
+        let (width, height) = decoder.dimensions();
+        if width != table.chunk_columns
+            || height < table.stored_rows(index)
+            || height > table.chunk_rows
+        {
+            return Err(damaged(&format!("a JPEG of {width} x {height} pixels")));
+        }
+        let decoded =
+            DynamicImage::from_decoder(decoder).map_err(|error| damaged(&error.to_string()))?;
+        let mut pixels = decoded.into_rgba8().into_raw();
+        if matches!(self.bands.colors, Colors::InverseGrey) {
+            for [red, green, blue, _] in pixels.as_chunks_mut().0 {
+                [red, green, blue]
+                    .into_iter()
+                    .for_each(|level| *level = !*level);
+            }
+        }
+        Ok(Samples::U8(pixels))
+    }
+}
+
+impl Bands {
+    fn read(bytes: &Bytes, ifd: &Ifd, count: u16) -> Result<Self, DemError> {
+        let colors = read_colors(bytes, ifd, count)?;
+        let extra = ifd.numbers(bytes, tag::EXTRA_SAMPLES)?.unwrap_or_default();
+        let first = usize::from(count).saturating_sub(extra.len());
+        let alpha = extra.iter().position(|kind| matches!(kind, 1 | 2));
+        let alpha = alpha.map(|at| Alpha {
+            band: first + at,
+            associated: extra[at] == 1,
+        });
+        let nothing = ifd.text(bytes, tag::GDAL_NODATA)?;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "compared with what it was"
+        )]
+        let whole = |value: f64| Some(value as u16).filter(|number| f64::from(*number) == value);
+        Ok(Self {
+            colors,
+            alpha: alpha.filter(|alpha| alpha.band > 0),
+            nothing: nothing
+                .and_then(|text| metadata::nodata(&text))
+                .and_then(whole),
+            apart: count > 1 && ifd.short(bytes, tag::PLANAR, 1)? == 2,
+        })
+    }
+
+    /// The bands that are read.
+    fn color_count(&self) -> usize {
+        if matches!(self.colors, Colors::Rgb) {
+            3
+        } else {
+            1
+        }
+    }
+
+    /// The planes that are decoded: all bands' together, or each colour's and then alpha's.
+    fn planes(&self) -> impl Iterator<Item = usize> {
+        let colors = if self.apart { self.color_count() } else { 1 };
+        let alpha = self.alpha.filter(|_| self.apart).map(|alpha| alpha.band);
+        (0..colors).chain(alpha)
+    }
+
+    /// The pixel at a place, of which `number` gives what lies in a plane at an index.
+    fn pixel(
+        &self,
+        at: usize,
+        bands: usize,
+        number: impl Fn(usize, usize) -> u16,
+        level: impl Fn(u16) -> u8,
+    ) -> Pixel {
+        let colors = self.color_count();
+        let band = |band: usize| {
+            if self.apart {
+                number(band, at)
+            } else {
+                number(0, at * bands + band)
+            }
+        };
+        let numbers = if colors == 3 {
+            [band(0), band(1), band(2)]
+        } else {
+            [band(0); 3]
+        };
+        let is_nothing = self.nothing.is_some_and(|nothing| numbers == [nothing; 3]);
+        let alpha = match self.alpha {
+            _ if is_nothing => return Pixel::default(),
+            Some(_) if self.apart => level(band(colors)),
+            Some(alpha) => level(band(alpha.band)),
+            None => u8::MAX,
+        };
+        if alpha == 0 {
+            return Pixel::default();
+        }
+        let [mut red, mut green, mut blue] = match &self.colors {
+            Colors::Grey | Colors::Rgb => numbers.map(level),
+            Colors::InverseGrey => numbers.map(|number| !level(number)),
+            Colors::Palette(palette) => palette
+                .get(usize::from(numbers[0]))
+                .copied()
+                .unwrap_or_default(),
+        };
+        if self.alpha.is_some_and(|alpha| alpha.associated) {
+            let whole = |level: u8| {
+                let whole = (u32::from(level) * 255 + u32::from(alpha) / 2) / u32::from(alpha);
+                u8::try_from(whole).unwrap_or(u8::MAX)
+            };
+            [red, green, blue] = [red, green, blue].map(whole);
+        }
+        [red, green, blue, alpha]
+    }
+}
+
+/// Refuses what cannot be read.
+fn check_coding(bytes: &Bytes, coding: &Coding, bands: &Bands, count: u16) -> Result<(), DemError> {
     let jpeg = coding.compression == JPEG;
     let unsupported = if jpeg { None } else { coding.unsupported() };
     if let Some(what) = unsupported {
@@ -44,31 +314,13 @@ pub(in super::super) fn read_picture(
             "an image of other than 8 or 16 bits, unsigned",
         ));
     }
-    if jpeg && (apart || coding.bits != 8 || !matches!(bands, 1 | 3)) {
+    if jpeg && (bands.apart || coding.bits != 8 || !matches!(count, 1 | 3)) {
         return Err(DemError::unsupported(
             bytes.path(),
             "JPEG compression of other than grey or YCbCr",
         ));
     }
-    let table = Table::read(bytes, ifd, &coding, if apart { bands } else { 1 })?;
-    check_size(bytes, table.width.into(), table.height.into())?;
-    let mut picture = vec![[0; 3]; table.width as usize * table.height as usize];
-    let tables = ifd.raw(bytes, tag::JPEG_TABLES)?;
-    let source = Source {
-        bytes,
-        coding,
-        table: &table,
-        colors,
-        apart,
-    };
-    for index in 0..table.plane_len() {
-        if jpeg {
-            source.copy_jpeg(index, tables.as_deref(), &mut picture)?;
-        } else {
-            source.copy(index, &mut picture)?;
-        }
-    }
-    Ok((table.width, table.height, picture))
+    Ok(())
 }
 
 fn read_colors(bytes: &Bytes, ifd: &Ifd, bands: u16) -> Result<Colors, DemError> {
@@ -105,130 +357,6 @@ fn read_palette(bytes: &Bytes, ifd: &Ifd) -> Result<Vec<[u8; 3]>, DemError> {
     Ok((0..count)
         .map(|index| [0, 1, 2].map(|band| level(values[band * count + index])))
         .collect())
-}
-
-/// An open image.
-struct Source<'a> {
-    bytes: &'a Bytes,
-    coding: Coding,
-    table: &'a Table,
-    colors: Colors,
-    apart: bool,
-}
-
-/// The part of an image that a strip or tile holds.
-struct Place {
-    row: usize,
-    column: usize,
-    rows: usize,
-    columns: usize,
-}
-
-impl Source<'_> {
-    fn place(&self, index: usize) -> Place {
-        let table = self.table;
-        let across = table.across() as usize;
-        let (row, column) = (
-            index / across * table.chunk_rows as usize,
-            index % across * table.chunk_columns as usize,
-        );
-        Place {
-            row,
-            column,
-            rows: (table.chunk_rows as usize).min(table.height as usize - row),
-            columns: (table.chunk_columns as usize).min(table.width as usize - column),
-        }
-    }
-
-    /// Copies pixels into the picture; `pixel` is given row and column in the strip or tile.
-    fn put(&self, index: usize, picture: &mut [[u8; 3]], pixel: impl Fn(usize, usize) -> [u8; 3]) {
-        let place = self.place(index);
-        for row in 0..place.rows {
-            let first = (place.row + row) * self.table.width as usize + place.column;
-            for (column, out) in picture[first..first + place.columns].iter_mut().enumerate() {
-                *out = pixel(row, column);
-            }
-        }
-    }
-
-    fn copy(&self, index: usize, picture: &mut [[u8; 3]]) -> Result<(), DemError> {
-        let plane_count = if self.apart { 3 } else { 1 };
-        let mut planes = Vec::new();
-        for plane in 0..plane_count {
-            let index = plane * self.table.plane_len() + index;
-            // A part that the file leaves out stays black.
-            let Some(place) = self.table.place(index) else {
-                return Ok(());
-            };
-            planes.push(self.table.decode(self.bytes, &self.coding, index, place)?);
-        }
-        let columns = self.table.chunk_columns as usize;
-        let bands = usize::from(self.coding.bands);
-        let band = |row: usize, column: usize, band: usize| {
-            let (plane, first) = if self.apart { (band, 0) } else { (0, band) };
-            level(&planes[plane], (row * columns + column) * bands + first)
-        };
-        self.put(index, picture, |row, column| match &self.colors {
-            Colors::Grey => [band(row, column, 0).0; 3],
-            Colors::InverseGrey => [!band(row, column, 0).0; 3],
-            Colors::Rgb => [0, 1, 2].map(|b| band(row, column, b).0),
-            Colors::Palette(palette) => palette
-                .get(usize::from(band(row, column, 0).1))
-                .copied()
-                .unwrap_or_default(),
-        });
-        Ok(())
-    }
-
-    fn copy_jpeg(
-        &self,
-        index: usize,
-        tables: Option<&[u8]>,
-        picture: &mut [[u8; 3]],
-    ) -> Result<(), DemError> {
-        let Some(place) = self.table.place(index) else {
-            return Ok(());
-        };
-        let stored = self.table.stored(self.bytes, &self.coding, index, place)?;
-        let damaged = |what: &str| self.table.damaged(self.bytes, index, what);
-        let (wanted, columns) = (self.place(index), self.table.chunk_columns as usize);
-        let file = match tables {
-            // Both are whole JPEG files: the end mark of one and the start mark of the other go.
-            Some([tables @ .., _, _]) => [tables, stored.get(2..).unwrap_or_default()].concat(),
-            _ => stored,
-        };
-        let decoder =
-            JpegDecoder::new(Cursor::new(file)).map_err(|error| damaged(&error.to_string()))?;
-        let (width, height) = decoder.dimensions();
-        if width as usize != columns
-            || (height as usize) < wanted.rows
-            || height > self.table.chunk_rows
-        {
-            return Err(damaged(&format!("a JPEG of {width} x {height} pixels")));
-        }
-        let decoded =
-            DynamicImage::from_decoder(decoder).map_err(|error| damaged(&error.to_string()))?;
-        let pixels = decoded.into_rgb8();
-        let inverse = matches!(self.colors, Colors::InverseGrey);
-        self.put(index, picture, |row, column| {
-            let pixel = pixels.as_raw().as_chunks::<3>().0[row * columns + column];
-            if inverse {
-                pixel.map(|level| !level)
-            } else {
-                pixel
-            }
-        });
-        Ok(())
-    }
-}
-
-/// A number as a level of 8 bits, and as it is.
-fn level(samples: &Samples, index: usize) -> (u8, u16) {
-    match samples {
-        Samples::U8(v) => (v[index], v[index].into()),
-        Samples::U16(v) => (to_8_bits(v[index]), v[index]),
-        _ => (0, 0),
-    }
 }
 
 /// A level of 16 bits as the nearest of 8.

@@ -145,7 +145,7 @@ fn passes(
         pass(Stage::Write, all.clone(), shards(all)),
     ];
     if let Some(imagery) = imagery {
-        let levels = 0..color::level_count(imagery.image, grid);
+        let levels = 0..color::level_count(imagery, grid);
         passes.push(pass(Stage::Color, levels.clone(), shards(levels)));
     }
     passes

@@ -55,12 +55,12 @@ use self::records::Records;
 use self::scale::Scale;
 use self::tasks::{Job, Tasks, Want};
 use super::{ColorMetadata, Metadata, PyramidError, PyramidWriter, ShardInfo};
-use crate::dem::{DemError, Raster};
+use crate::dem::{DemError, Image, Raster};
 use crate::geo::Grid;
 
 /// The version of the builder's arithmetic: to be raised with every change after which the same input gives other
 /// bytes, so that no build is gone on with by a builder that would have made it otherwise.
-const BUILDER: u32 = 1;
+const BUILDER: u32 = 2;
 
 /// Builds a pyramid.
 ///
@@ -269,7 +269,8 @@ fn fingerprint(
     scale: &Scale,
 ) -> String {
     let header = raster.header();
-    let imagery = imagery.map(|imagery| (&imagery.sources, imagery.image.extent));
+    let extents = |images: &[Image]| images.iter().map(|image| image.extent).collect::<Vec<_>>();
+    let imagery = imagery.map(|imagery| (&imagery.sources, extents(imagery.images)));
     format!(
         "builder {BUILDER} {:?} {:?} {} {scale:?} {:?} {imagery:?} {}",
         header.grid,

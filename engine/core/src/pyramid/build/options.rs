@@ -37,8 +37,8 @@ pub struct BuildOptions {
 /// Imagery to drape over the terrain.
 #[derive(Clone, Debug)]
 pub struct Imagery<'a> {
-    /// The picture; without an extent it is stretched over the elevation model.
-    pub image: &'a Image,
+    /// The pictures, later ones over earlier ones; one without an extent is stretched over the elevation model.
+    pub images: &'a [Image],
     /// Its files.
     pub sources: Vec<SourceMetadata>,
 }

@@ -48,15 +48,12 @@ impl Shape {
         let threads = threads.unwrap_or_else(|| {
             std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
         });
-        let fixed = FIXED_BYTES
-            + raster.memory_bytes()
-            + imagery.map_or(0, |imagery| {
-                3 * imagery.image.rgb.len() as u64 + color::memory_bytes(imagery.image, &grid)
-            });
+        let fixed = FIXED_BYTES + raster.memory_bytes() + imagery.map_or(0, color::memory_bytes);
+        let thread = imagery.map_or(0, color::thread_bytes);
         let budget = options.memory_budget.unwrap_or(u64::MAX);
         let shapes = (1..=threads).rev().flat_map(|threads| {
             std::iter::successors(Some(MOST_TILES), |tiles| (*tiles > 1).then_some(tiles / 2))
-                .map(move |tiles| Self::of(raster, fixed, threads, tiles))
+                .map(move |tiles| Self::of(raster, [fixed, thread], threads, tiles))
         });
         let mut least = None;
         for shape in shapes {
@@ -74,14 +71,19 @@ impl Shape {
         )))
     }
 
-    fn of(raster: &dyn Raster, fixed: u64, threads: usize, block_tiles: usize) -> Self {
+    fn of(
+        raster: &dyn Raster,
+        [fixed, thread]: [u64; 2],
+        threads: usize,
+        block_tiles: usize,
+    ) -> Self {
         let side = block_tiles * TILE_CELLS;
         let window_samples = (side * side) as u64;
         // A plane's last block of a row or column takes the plane's last sample too.
         let block = ((side + 1 + 2 * HALO) as u64).pow(2) * BLOCK_SAMPLE_BYTES;
         let samples = read::window_samples(raster, window_samples);
         let window = samples * WINDOW_SAMPLE_BYTES + raster.read_bytes(samples);
-        let memory_bytes = fixed + threads as u64 * (THREAD_BYTES + block.max(window));
+        let memory_bytes = fixed + threads as u64 * (THREAD_BYTES + block.max(window).max(thread));
         Self {
             threads,
             block_tiles,
