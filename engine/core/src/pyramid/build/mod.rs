@@ -12,12 +12,15 @@
 mod area;
 mod border;
 mod color;
+mod distribute;
 mod errors;
 mod estimate;
 mod features;
+mod finished;
 mod fit;
 mod graph;
 mod ground;
+mod inputs;
 mod journal;
 mod levels;
 mod measure;
@@ -39,10 +42,14 @@ pub(crate) mod testing;
 mod tests;
 mod voids;
 
-use std::sync::atomic::AtomicBool;
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
+pub use distribute::{PlannedTask, finish, plan_tasks, run_task};
 pub use estimate::{BuildPlan, PassPlan, plan};
+pub use inputs::InputStamp;
 pub use options::{BuildOptions, BuildReport, Imagery, Progress, Stage};
 
 use self::errors::Errors;
@@ -81,45 +88,21 @@ pub fn build(
 ) -> Result<BuildReport, PyramidError> {
     let start = Instant::now();
     let plan = Plan::new(raster, imagery, options)?;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(plan.shape.threads)
-        .build()
-        .map_err(|error| {
-            PyramidError::Refused(format!("the threads could not be started: {error}"))
-        })?;
+    if !options.overwrite
+        && let Some(report) = finished::report(&options.output, &plan.fingerprint)
+    {
+        return Ok(report);
+    }
     let writer = PyramidWriter::resume(&options.output, options.overwrite, &plan.fingerprint)?;
     let watch = Watch::new(progress, cancel);
-    let tasks = Tasks {
-        passes: graph::passes(raster, imagery, !options.features.is_empty()),
-        want: Want::Whole,
-        folder: writer.folder().to_owned(),
-        watch: &watch,
-        journal: Journal::new(writer.journal()),
-        done: AtomicBool::new(false),
-    };
-    let made = pool.install(|| plan.run(raster, imagery, options, &writer, &tasks));
-    match made {
-        Ok((metadata, shards, report)) => {
-            writer.publish(&metadata, &shards)?;
-            Ok(BuildReport {
-                seconds: start.elapsed().as_secs_f64(),
-                ..report
-            })
-        }
-        Err(error) => {
-            let resumable = matches!(
-                error,
-                PyramidError::Interrupted
-                    | PyramidError::Io { .. }
-                    | PyramidError::Dem(DemError::Io { .. })
-            );
-            if !resumable || plan.fingerprint.is_empty() {
-                // The first error is the one to tell; what cannot be removed now, the next run removes.
-                let _ = writer.discard();
-            }
-            Err(error)
-        }
+    if writer.started_over() {
+        watch.stage(Stage::StartOver, 0)(0)?;
     }
+    let report = plan.carry_out(raster, imagery, options, (writer, Want::Whole), &watch)?;
+    Ok(BuildReport {
+        seconds: start.elapsed().as_secs_f64(),
+        ..report.unwrap_or_default()
+    })
 }
 
 /// What is settled before anything is read.
@@ -151,6 +134,70 @@ impl Plan {
             shape,
             fingerprint,
         })
+    }
+
+    /// Does what is wanted; a report where that is a pyramid.
+    fn carry_out(
+        &self,
+        raster: &dyn Raster,
+        imagery: Option<&Imagery<'_>>,
+        options: &BuildOptions,
+        (writer, want): (PyramidWriter, Want),
+        watch: &Watch<'_>,
+    ) -> Result<Option<BuildReport>, PyramidError> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(self.shape.threads)
+            .build()
+            .map_err(|error| {
+                PyramidError::Refused(format!("the threads could not be started: {error}"))
+            })?;
+        let tasks = Tasks {
+            passes: graph::passes(raster, imagery, !options.features.is_empty()),
+            want,
+            folder: writer.folder().to_owned(),
+            watch,
+            journal: Journal::new(writer.journal()),
+            kept: AtomicUsize::new(0),
+            done: AtomicBool::new(false),
+        };
+        let made = pool.install(|| {
+            let made = self.run(raster, imagery, options, &writer, &tasks);
+            match (&made, tasks.done.load(Ordering::Relaxed)) {
+                (Ok(_), _) | (_, true) => inputs::check(&options.inputs).and(made),
+                _ => made,
+            }
+        });
+        match made {
+            Ok(_) if matches!(want, Want::Task(_)) => Ok(None),
+            Ok((metadata, shards, report)) => {
+                if want == Want::Finish {
+                    check_there(writer.folder(), &shards)?;
+                }
+                let report = BuildReport {
+                    kept_tasks: tasks.kept.load(Ordering::Relaxed),
+                    ..report
+                };
+                if !self.fingerprint.is_empty() {
+                    finished::note(writer.folder(), &self.fingerprint, &report)?;
+                }
+                writer.publish(&metadata, &shards)?;
+                Ok(Some(report))
+            }
+            Err(PyramidError::Interrupted) if tasks.done.load(Ordering::Relaxed) => Ok(None),
+            Err(error) => {
+                let resumable = matches!(
+                    error,
+                    PyramidError::Interrupted
+                        | PyramidError::Io { .. }
+                        | PyramidError::Dem(DemError::Io { .. })
+                );
+                if want == Want::Whole && (!resumable || self.fingerprint.is_empty()) {
+                    // The first error is the one to tell; what cannot be removed now, the next run removes.
+                    let _ = writer.discard();
+                }
+                Err(error)
+            }
+        }
     }
 
     fn run(
@@ -261,6 +308,23 @@ impl Plan {
     }
 }
 
+/// Says which shard is not there, or not of its size.
+fn check_there(folder: &Path, shards: &[ShardInfo]) -> Result<(), PyramidError> {
+    let there = |shard: &&ShardInfo| {
+        fs::metadata(folder.join(&shard.key)).is_ok_and(|about| about.len() == shard.bytes)
+    };
+    match shards.iter().find(|shard| !there(shard)) {
+        None => Ok(()),
+        Some(shard) => Err(PyramidError::Invalid {
+            path: folder.join(&shard.key),
+            what: format!(
+                "is to be a shard of {} bytes; do its task again",
+                shard.bytes
+            ),
+        }),
+    }
+}
+
 /// One line that says all that decides the bytes: an interrupted build of the same is gone on with.
 fn fingerprint(
     raster: &dyn Raster,
@@ -272,10 +336,11 @@ fn fingerprint(
     let extents = |images: &[Image]| images.iter().map(|image| image.extent).collect::<Vec<_>>();
     let imagery = imagery.map(|imagery| (&imagery.sources, extents(imagery.images)));
     format!(
-        "builder {BUILDER} {:?} {:?} {} {scale:?} {:?} {imagery:?} {}",
+        "builder {BUILDER} {:?} {:?} {} {scale:?} {:?} {:?} {imagery:?} {}",
         header.grid,
         header.crs,
         header.reading,
+        options.vertical,
         options.sources,
         features::fingerprint(&options.features)
     )

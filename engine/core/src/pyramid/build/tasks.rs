@@ -6,7 +6,7 @@
 //! in whichever order the passes allow.
 
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
@@ -25,8 +25,12 @@ pub(super) struct Pass {
     pub(super) name: String,
     /// How many tasks it is.
     pub(super) tasks: usize,
-    /// Samples or texels that all of them go over.
+    /// Samples that all of them go over; bytes, where it is imagery.
     pub(super) samples: u64,
+    /// The planes it reads.
+    pub(super) reads: Vec<String>,
+    /// The planes or arrays it writes.
+    pub(super) writes: Vec<String>,
 }
 
 /// What is wanted of a build.
@@ -48,6 +52,8 @@ pub(super) struct Tasks<'a> {
     pub(super) folder: PathBuf,
     pub(super) watch: &'a Watch<'a>,
     pub(super) journal: Journal,
+    /// Tasks that had been done before.
+    pub(super) kept: AtomicUsize,
     /// The one task that was wanted is done.
     pub(super) done: AtomicBool,
 }
@@ -93,6 +99,7 @@ impl Tasks<'_> {
         for (task, kept) in wanted.into_iter().zip(kept) {
             let blocks = blocks(task);
             if let Some(kept) = kept {
+                self.kept.fetch_add(1, Ordering::Relaxed);
                 (job.advance)(blocks.len() as u64)?;
                 all = all.and(kept, &join);
             } else {
@@ -152,11 +159,14 @@ impl Tasks<'_> {
                 name: name.to_owned(),
                 tasks: count,
                 samples: 0,
+                reads: Vec::new(),
+                writes: Vec::new(),
             }],
             want: Want::Whole,
             folder: folder.to_owned(),
             watch,
             journal: Journal::new(folder.join("journal")),
+            kept: AtomicUsize::new(0),
             done: AtomicBool::new(false),
         }
     }

@@ -357,6 +357,8 @@ mod tests {
                 name: format!("{what}-{number}"),
                 tasks: 1,
                 samples: 0,
+                reads: Vec::new(),
+                writes: Vec::new(),
             }));
         }
         let gaps = Gaps {

@@ -75,6 +75,8 @@ pub struct PyramidWriter {
     journal: Mutex<File>,
     /// What an earlier, interrupted run of the same build wrote.
     kept: HashMap<String, ShardInfo>,
+    /// What an earlier run of another build wrote is thrown away.
+    started_over: bool,
 }
 
 impl PyramidWriter {
@@ -102,27 +104,66 @@ impl PyramidWriter {
         let mut marker = claim(&folder)?;
         let found = std::io::read_to_string(&marker)
             .map_err(PyramidError::io("reading", folder.join(MARKER)))?;
-        let kept = if fingerprint.is_empty() || found != fingerprint {
+        let other = fingerprint.is_empty() || found != fingerprint;
+        if other {
             start_over(&folder, &mut marker, fingerprint)?;
-            HashMap::new()
-        } else {
-            read_journal(&folder)?
-        };
+        }
+        Ok(Self {
+            started_over: other && !found.is_empty(),
+            ..Self::open(path, overwrite, marker)?
+        })
+    }
+
+    /// Takes part in a build of a `fingerprint` that [`Self::resume`] has begun, beside others, or `alone` when they are
+    /// done.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::create`]; refused where no such build is there, or others are at work.
+    pub fn join(
+        path: &Path,
+        overwrite: bool,
+        fingerprint: &str,
+        alone: bool,
+    ) -> Result<Self, PyramidError> {
+        check_target(path, overwrite)?;
+        let folder = sibling(path, ".building");
+        let marker = place::join(&folder, alone)?;
+        let found = std::io::read_to_string(&marker)
+            .map_err(PyramidError::io("reading", folder.join(MARKER)))?;
+        if found != fingerprint {
+            return Err(PyramidError::Refused(format!(
+                "{}: is of other inputs or options, or by another version; plan it again",
+                folder.display()
+            )));
+        }
+        Self::open(path, overwrite, marker)
+    }
+
+    fn open(path: &Path, overwrite: bool, marker: File) -> Result<Self, PyramidError> {
+        let folder = sibling(path, ".building");
+        let kept = read_journal(&folder)?;
         let journal_path = folder.join(JOURNAL);
         let journal = File::options()
             .append(true)
             .create(true)
             .open(&journal_path)
             .map_err(PyramidError::io("opening", journal_path))?;
-        let target = path.into();
         Ok(Self {
-            target,
+            target: path.into(),
             folder,
             overwrite,
             _marker: marker,
             journal: Mutex::new(journal),
             kept,
+            started_over: false,
         })
+    }
+
+    /// True where what an earlier run of another build had left was thrown away.
+    #[must_use]
+    pub const fn started_over(&self) -> bool {
+        self.started_over
     }
 
     /// Writes the records of one level's 32 × 32 block of tiles: row and column `shard` of its shards.
@@ -369,6 +410,17 @@ fn read_journal(folder: &Path) -> Result<HashMap<String, ShardInfo>, PyramidErro
         .iter()
         .filter_map(|line| serde_json::from_slice::<ShardInfo>(line).ok());
     Ok(infos.map(|info| (info.key.clone(), info)).collect())
+}
+
+/// The manifest of a pyramid; none where it cannot be read.
+pub(super) fn manifest(pyramid: &Path) -> Option<Vec<ShardInfo>> {
+    let text = fs::read(pyramid.join(MANIFEST)).ok()?;
+    let lines = text
+        .split(|byte| *byte == b'\n')
+        .filter(|line| !line.is_empty());
+    lines
+        .map(|line| serde_json::from_slice(line).ok())
+        .collect()
 }
 
 /// Says which shard of the levels is not in the list.
