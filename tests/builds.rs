@@ -89,7 +89,9 @@ fn a_build_that_is_killed_at_any_moment_goes_on_to_the_same_bytes() {
             .spawn()
             .expect("drumlin starts");
         // Moments all over the build, and later ones from time to time, so that some run ends.
-        thread::sleep(Duration::from_millis(20 + 397 * kills % (150 + 30 * kills)));
+        thread::sleep(Duration::from_millis(
+            20 + 397 * kills % (150 + 100 * kills),
+        ));
         let _ = build.kill();
         let ended = build.wait_with_output().expect("drumlin ends");
         if ended.status.success() {

@@ -11,6 +11,7 @@ mod golden;
 mod gpu_parity;
 mod imagery;
 mod layers;
+mod pack;
 mod picture;
 mod refine;
 mod shared_structs;

@@ -1,12 +1,8 @@
 //! `drumlin info`: what a pyramid holds.
 
-use std::{
-    fmt::Write,
-    fs, io,
-    path::{Path, PathBuf},
-};
+use std::{fmt::Write, path::PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use drumlin_core::pyramid::{Metadata, Pyramid};
 use drumlin_terminal::{outcome::Outcome, print, size};
@@ -25,7 +21,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
     let pyramid = Pyramid::open(&arguments.pyramid)?;
     let metadata = pyramid.metadata();
-    let bytes = Bytes::count(&arguments.pyramid, metadata)?;
+    let bytes = Bytes::count(&pyramid)?;
     let text = if arguments.json {
         format!("{:#}\n", json(metadata, &bytes)?)
     } else {
@@ -48,38 +44,17 @@ struct Bytes {
 }
 
 impl Bytes {
-    fn count(pyramid: &Path, metadata: &Metadata) -> Result<Self> {
-        let count = |folder: PathBuf| {
-            folder_bytes(&folder).with_context(|| format!("{}: reading failed", folder.display()))
-        };
-        let levels = 0..metadata.levels.len();
+    fn count(pyramid: &Pyramid) -> Result<Self> {
+        let count = |folder: &str| pyramid.store().bytes_under(folder);
+        let levels = 0..pyramid.metadata().levels.len();
         Ok(Self {
             levels: levels
-                .map(|level| count(pyramid.join("tile").join(level.to_string())))
-                .collect::<Result<_>>()?,
-            color: count(pyramid.join("color"))?,
-            all: count(pyramid.to_owned())?,
+                .map(|level| count(&format!("tile/{level}")))
+                .collect::<Result<_, _>>()?,
+            color: count("color")?,
+            all: count("")?,
         })
     }
-}
-
-/// Bytes of all files in a folder; none where there is no folder.
-fn folder_bytes(folder: &Path) -> io::Result<u64> {
-    let entries = match fs::read_dir(folder) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0),
-        entries => entries?,
-    };
-    let mut sum = 0;
-    for entry in entries {
-        let entry = entry?;
-        let metadata = entry.metadata()?;
-        sum += if metadata.is_dir() {
-            folder_bytes(&entry.path())?
-        } else {
-            metadata.len()
-        };
-    }
-    Ok(sum)
 }
 
 fn json(metadata: &Metadata, bytes: &Bytes) -> Result<Value> {

@@ -11,6 +11,7 @@ mod height;
 mod info;
 mod input_list;
 mod interrupt;
+mod pack;
 mod plan;
 mod progress;
 mod sources;
@@ -41,7 +42,7 @@ enum Verb {
     Build(build::Arguments),
     /// Writes a build down as tasks, for as many processes and machines as see its files
     #[command(after_help = EXIT_CODES)]
-    Plan(plan::Arguments),
+    Plan(plan::PlanArguments),
     /// Does one task of a plan, where it is not done; the passes before it are
     #[command(after_help = EXIT_CODES)]
     Task(plan::TaskArguments),
@@ -63,6 +64,12 @@ enum Verb {
     /// Makes the cage of a cliff, an arch or a road, for `build --features`
     #[command(after_help = EXIT_CODES)]
     Feature(feature::Arguments),
+    /// Makes one file of a pyramid: a ZIP archive, uncompressed, that every verb reads
+    #[command(after_help = EXIT_CODES)]
+    Pack(pack::PackArguments),
+    /// Makes a folder of a pyramid's archive again
+    #[command(after_help = EXIT_CODES)]
+    Unpack(pack::UnpackArguments),
     /// Makes an elevation model: endless mountains, a function of a seed, the same on every machine
     #[command(after_help = EXIT_CODES)]
     Synth(synth::Arguments),
@@ -89,6 +96,8 @@ fn main() -> ExitCode {
         Verb::Height(arguments) => height::run(&arguments),
         Verb::Cage(arguments) => cage::run(&arguments),
         Verb::Feature(arguments) => feature::run(&arguments),
+        Verb::Pack(arguments) => pack::run_pack(&arguments),
+        Verb::Unpack(arguments) => pack::run_unpack(&arguments),
         Verb::Synth(arguments) => synth::run(&arguments),
         Verb::View(arguments) => viewer::run("view", &arguments),
         Verb::Fly(arguments) => viewer::run("fly", &arguments),

@@ -39,7 +39,7 @@ const VERSION: u32 = 1;
 const HEAD_LIMIT: u64 = 1 << 30;
 
 #[derive(Debug, Args)]
-pub(crate) struct Arguments {
+pub(crate) struct PlanArguments {
     #[command(flatten)]
     build: build::Arguments,
     /// The plan to write: JSON lines
@@ -83,10 +83,10 @@ struct Head {
 #[derive(Debug, Parser)]
 struct Words {
     #[command(flatten)]
-    plan: Arguments,
+    plan: PlanArguments,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
+pub(crate) fn run(arguments: &PlanArguments) -> Result<Outcome> {
     if arguments.build.dry_run {
         bail!("a plan is dry: --dry-run goes with build");
     }

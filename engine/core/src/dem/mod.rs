@@ -21,6 +21,7 @@ mod mosaic;
 mod placement;
 mod plain;
 mod png;
+mod projection;
 mod raw;
 mod samples;
 mod synth;

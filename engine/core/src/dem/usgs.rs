@@ -215,7 +215,7 @@ fn read_crs(file: &[u8]) -> Result<Crs, String> {
                 code,
                 name,
                 ellipsoid: nad27,
-                unit_metres: 1.0,
+                ..Crs::unknown()
             })
         }
         (system, unit) => Err(format!(

@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::CrsError;
+use super::definition::Definition;
+
 /// What the coordinates are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -60,6 +63,9 @@ pub struct Crs {
     pub kind: CrsKind,
     /// Authority and code, as `EPSG:4326`, where known.
     pub code: Option<String>,
+    /// What the coordinates are as a PROJ string, where no code says it and a file's parameters do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub definition: Option<String>,
     /// A human's name for it, as its file says.
     pub name: Option<String>,
     /// The ellipsoid of geographic coordinates.
@@ -75,6 +81,7 @@ impl Crs {
         Self {
             kind: CrsKind::Unknown,
             code: None,
+            definition: None,
             name: None,
             ellipsoid: Ellipsoid::WGS84,
             unit_metres: 1.0,
@@ -91,6 +98,44 @@ impl Crs {
         }
     }
 
+    /// A system by authority and code, as `EPSG:32633`; x is east and y is north whatever order the authority prefers.
+    ///
+    /// # Errors
+    /// [`CrsError`] when the code is not one of the EPSG registry's projected or geographic systems.
+    pub fn from_code(code: &str) -> Result<Self, CrsError> {
+        let definition = Definition::of_code(code)?;
+        let geographic = definition.is_geographic();
+        Ok(Self {
+            kind: if geographic {
+                CrsKind::Geographic
+            } else {
+                CrsKind::Projected
+            },
+            code: Some(code.to_uppercase()),
+            definition: None,
+            name: None,
+            ellipsoid: definition.ellipsoid()?,
+            unit_metres: if geographic {
+                1.0
+            } else {
+                definition.unit_metres()?
+            },
+        })
+    }
+
+    /// Datum and ellipsoid as a PROJ string's parameters: by a geographic system's code where there is one, else the
+    /// ellipsoid alone.
+    pub(crate) fn base_parameters(code: Option<&str>, ellipsoid: Ellipsoid) -> String {
+        let known = code.and_then(|code| Definition::of_code(code).ok());
+        let geographic = Self {
+            kind: CrsKind::Geographic,
+            ellipsoid,
+            ..Self::unknown()
+        };
+        let own = known.or_else(|| Definition::of(&geographic).ok());
+        own.map_or_else(String::new, |definition| definition.base().text())
+    }
+
     /// True when both mean the same coordinates: equal codes where both have one, else equal in all but the name.
     #[must_use]
     pub fn same_as(&self, other: &Self) -> bool {
@@ -100,6 +145,9 @@ impl Crs {
                 self.kind == other.kind
                     && self.ellipsoid == other.ellipsoid
                     && self.unit_metres == other.unit_metres
+                    && (self.definition == other.definition
+                        || self.code.is_some()
+                        || other.code.is_some())
             }
         }
     }

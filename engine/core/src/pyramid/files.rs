@@ -2,7 +2,7 @@
 
 use std::{
     fs::{self, File},
-    io::{ErrorKind, Write},
+    io::{ErrorKind, Read, Write},
     path::{Path, PathBuf},
     sync::atomic::{AtomicU64, Ordering},
     time::SystemTime,
@@ -76,6 +76,27 @@ pub(super) fn write_whole_as(
     }
     fs::rename(partial, path).map_err(PyramidError::io("renaming", partial))?;
     sync_folder(folder)
+}
+
+/// Copies all there is to read; how many bytes, and their BLAKE3. The names are for messages.
+pub(super) fn copy_hashed(
+    from: &mut dyn Read,
+    from_name: &str,
+    to: &mut dyn Write,
+    to_path: &Path,
+) -> Result<(u64, String), PyramidError> {
+    let mut hasher = blake3::Hasher::new();
+    let mut piece = vec![0; 1 << 20];
+    loop {
+        let count = match from.read(&mut piece) {
+            Ok(0) => return Ok((hasher.count(), hasher.finalize().to_hex().to_string())),
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            read => read.map_err(PyramidError::io("reading", from_name))?,
+        };
+        hasher.update(&piece[..count]);
+        to.write_all(&piece[..count])
+            .map_err(PyramidError::io("writing", to_path))?;
+    }
 }
 
 /// Removes a folder and all in it, where there is one.

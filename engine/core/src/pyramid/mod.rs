@@ -7,7 +7,9 @@ mod error;
 pub mod feature;
 mod files;
 pub(crate) mod light;
+mod manifest;
 mod metadata;
+mod pack;
 mod patch_code;
 mod reader;
 mod record;
@@ -28,11 +30,14 @@ pub use error::PyramidError;
 pub use feature::{FeatureGroup, FeatureMetadata};
 pub use files::{write_whole, write_whole_with};
 pub use metadata::{ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};
+pub use pack::{pack, unpack};
 pub use patch_code::{HALF_OCTAVES, NEVER, patch_error, patch_nibble};
 pub use reader::Pyramid;
 pub use record::{Record, RecordLayout, RecordParts, VOID_BYTES, number_bytes};
 pub use shard::{SHARD_TILES, shard_count, shard_shape};
-pub use store::{FaultStore, Faults, FileStore, MappedStore, Store, StoreError};
+pub use store::{
+    FaultStore, Faults, FileStore, MappedStore, Store, StoreError, ZipStore, open_store,
+};
 pub use tile::{Summary, Tile};
 pub use validate::{Finding, Report, validate};
 pub use writer::{Contents, PyramidWriter, ShardInfo};

@@ -12,8 +12,8 @@ use std::{
 use lru::LruCache;
 
 use super::{
-    COLOR_TEXELS, FeatureGroup, MappedStore, Metadata, PyramidError, Record, RecordLayout, Store,
-    StoreError, Tile, feature,
+    COLOR_TEXELS, FeatureGroup, Metadata, PyramidError, Record, RecordLayout, Store, StoreError,
+    Tile, feature, open_store,
     shard::{SHARD_TILES, ShardIndex, decode_chunk, shard_shape},
     surface::{self, CONTROL_LIMIT},
     zarr,
@@ -57,14 +57,13 @@ pub struct Pyramid {
 }
 
 impl Pyramid {
-    /// Opens a folder, to be read through memory maps.
+    /// Opens a folder or a ZIP archive, to be read through memory maps.
     ///
     /// # Errors
     ///
     /// Where it is no finished pyramid, or one of another version.
     pub fn open(path: &Path) -> Result<Self, PyramidError> {
-        path.metadata().map_err(PyramidError::io("opening", path))?;
-        Self::with_store(Box::new(MappedStore::new(path)))
+        Self::with_store(open_store(path)?)
     }
 
     /// Opens whatever a store holds.
@@ -81,6 +80,12 @@ impl Pyramid {
             layouts,
             indices: Mutex::new(LruCache::new(INDEX_COUNT)),
         })
+    }
+
+    /// Where its bytes come from.
+    #[must_use]
+    pub fn store(&self) -> &dyn Store {
+        &*self.store
     }
 
     /// What the pyramid says of itself.

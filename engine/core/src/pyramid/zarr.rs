@@ -39,24 +39,48 @@ pub(super) fn root_json(metadata: &Metadata) -> Result<Vec<u8>, serde_json::Erro
     serde_json::to_vec_pretty(&node)
 }
 
+/// The files of all nodes but the root, and what is in them.
+pub(super) fn nodes(metadata: &Metadata) -> Vec<(String, Vec<u8>)> {
+    let grid = &metadata.grid;
+    let mut nodes = vec![("tile".into(), group_json())];
+    for (index, level) in metadata.levels.iter().enumerate() {
+        let array = tile_array_json(level.tiles, &RecordLayout::new(level));
+        nodes.push((format!("tile/{index}"), array));
+    }
+    if let Some(features) = &metadata.features {
+        let array = feature_array_json(grid.tiles(features.level), features);
+        nodes.push(("feature".into(), group_json()));
+        nodes.push((format!("feature/{}", features.level), array));
+    }
+    if let Some(color) = &metadata.color {
+        nodes.push(("color".into(), group_json()));
+        nodes.extend((0..color.levels).map(|level| {
+            let array = color_array_json(grid.tiles(level));
+            (format!("color/{level}"), array)
+        }));
+    }
+    let file = |(name, text)| (format!("{name}/{NODE}"), text);
+    nodes.into_iter().map(file).collect()
+}
+
 /// The `zarr.json` of a group without attributes.
-pub(super) fn group_json() -> Vec<u8> {
+fn group_json() -> Vec<u8> {
     text(&json!({"zarr_format": 3, "node_type": "group", "attributes": {}}))
 }
 
 /// The `zarr.json` of a level's records: `[rows, columns, bytes]`, one record a chunk.
-pub(super) fn tile_array_json(tiles: [u32; 2], layout: &RecordLayout) -> Vec<u8> {
+fn tile_array_json(tiles: [u32; 2], layout: &RecordLayout) -> Vec<u8> {
     array_json(tiles, &[layout.byte_count()], &["row", "column", "byte"])
 }
 
 /// The `zarr.json` of a level's imagery: `[rows, columns, 256, 256, 4]`, one tile a chunk.
-pub(super) fn color_array_json(tiles: [u32; 2]) -> Vec<u8> {
+fn color_array_json(tiles: [u32; 2]) -> Vec<u8> {
     let names = ["row", "column", "texel_row", "texel_column", "rgba"];
     array_json(tiles, &[COLOR_TEXELS, COLOR_TEXELS, 4], &names)
 }
 
 /// The `zarr.json` of the features' records: `[rows, columns, bytes]`, one record a chunk.
-pub(super) fn feature_array_json(tiles: [u32; 2], features: &FeatureMetadata) -> Vec<u8> {
+fn feature_array_json(tiles: [u32; 2], features: &FeatureMetadata) -> Vec<u8> {
     let bytes = features.record_bytes as usize;
     array_json(tiles, &[bytes], &["row", "column", "byte"])
 }

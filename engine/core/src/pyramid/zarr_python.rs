@@ -1,4 +1,4 @@
-//! The arrays open in zarr-python, and the lines of Python in `FORMAT.md` give our heights.
+//! The arrays open in zarr-python, from the folder and from an archive, and the lines of Python in `FORMAT.md` give our heights.
 //!
 //! Skipped with a message where there is no zarr-python; with `CI=true` that is a failure.
 
@@ -8,7 +8,7 @@ use std::{
     process::Command,
 };
 
-use super::{Pyramid, sample, surface};
+use super::{Pyramid, pack, sample, surface, write_whole_with};
 
 /// What is done after the lines of `FORMAT.md`: every tile is compared with the file of heights, and with the shared
 /// executable rule where that is at hand.
@@ -43,6 +43,10 @@ assert at == len(want)
 color = root["color/0"]
 assert color.shape == (1, 1, 256, 256, 4) and (color[0, 0] == 9).all()
 assert root.attrs["proj:code"] == "EPSG:32610" and root.attrs["height_unit_metres"] == 1 / 16
+packed = zarr.open_group(zarr.storage.ZipStore(folder / "out.zip", mode="r"), mode="r")
+for level in range(len(root.attrs["levels"])):
+    assert np.array_equal(packed[f"tile/{level}"][:], root[f"tile/{level}"][:]), level
+assert packed.attrs.asdict() == root.attrs.asdict()
 print("equal")
 "#;
 
@@ -89,6 +93,11 @@ fn zarr_python_reads_the_heights_we_read() {
     let folder = tempfile::tempdir().unwrap();
     let pyramid = folder.path().join("out.zarr");
     sample::write(&pyramid, 700, 300);
+    let zip = folder.path().join("out.zip");
+    write_whole_with(&zip, |file| {
+        pack(&Pyramid::open(&pyramid)?, file, &zip, &mut |_, _| {})
+    })
+    .unwrap();
     write_heights(&pyramid, &folder.path().join("heights"));
     let script = folder.path().join("compare.py");
     fs::write(&script, format_lines() + COMPARE).unwrap();

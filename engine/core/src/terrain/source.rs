@@ -12,8 +12,7 @@ use std::{
 use crate::{
     geo::TileId,
     pyramid::{
-        MappedStore, Metadata, Pyramid, PyramidError, Store, StoreError, Tile,
-        feature::FeatureGroup,
+        Metadata, Pyramid, PyramidError, Store, StoreError, Tile, feature::FeatureGroup, open_store,
     },
     stream::TileSource,
 };
@@ -26,14 +25,13 @@ pub struct PyramidSource {
 }
 
 impl PyramidSource {
-    /// Opens a folder, to be read through memory maps.
+    /// Opens a folder or a ZIP archive, to be read through memory maps.
     ///
     /// # Errors
     ///
     /// Where it is no finished pyramid.
     pub fn open(path: &Path) -> Result<Self, PyramidError> {
-        path.metadata().map_err(PyramidError::io("opening", path))?;
-        Self::with_store(Box::new(MappedStore::new(path)))
+        Self::with_store(open_store(path)?)
     }
 
     /// Opens whatever a store holds.
@@ -104,6 +102,10 @@ impl Store for CountingStore {
 
     fn size(&self, key: &str) -> Result<u64, StoreError> {
         self.store.size(key)
+    }
+
+    fn bytes_under(&self, folder: &str) -> Result<u64, StoreError> {
+        self.store.bytes_under(folder)
     }
 
     fn name(&self, key: &str) -> String {

@@ -6,9 +6,10 @@ use std::collections::BTreeMap;
 
 use self::geo_key::{
     ANGULAR_UNIT, CITATION, ELLIPSOID, GEOGRAPHIC, GEOGRAPHIC_CITATION, INVERSE_FLATTENING,
-    LINEAR_UNIT, LINEAR_UNIT_METRES, MODEL_TYPE, PROJECTED, PROJECTED_CITATION, RASTER_TYPE,
-    SEMI_MAJOR, SEMI_MINOR, VERTICAL, VERTICAL_UNIT,
+    LINEAR_UNIT, LINEAR_UNIT_METRES, METHOD, MODEL_TYPE, PROJECTED, PROJECTED_CITATION,
+    RASTER_TYPE, SEMI_MAJOR, SEMI_MINOR, VERTICAL, VERTICAL_UNIT,
 };
+use super::super::projection::{Method, Projection};
 use super::super::{DemError, bytes::Bytes, units};
 use super::ifd::{Ifd, tag};
 use crate::geo::{Crs, CrsKind, Ellipsoid};
@@ -27,6 +28,7 @@ pub(crate) mod geo_key {
     pub(crate) const INVERSE_FLATTENING: u16 = 2059;
     pub(crate) const PROJECTED: u16 = 3072;
     pub(crate) const PROJECTED_CITATION: u16 = 3073;
+    pub(crate) const METHOD: u16 = 3075;
     pub(crate) const LINEAR_UNIT: u16 = 3076;
     pub(crate) const LINEAR_UNIT_METRES: u16 = 3077;
     pub(crate) const VERTICAL: u16 = 4096;
@@ -129,6 +131,7 @@ impl GeoKeys {
         }
         Ok(Crs {
             kind: CrsKind::Geographic,
+            definition: None,
             code: self.code(GEOGRAPHIC),
             name: self.name([GEOGRAPHIC_CITATION, CITATION]),
             ellipsoid: self.ellipsoid(),
@@ -146,11 +149,44 @@ impl GeoKeys {
         let unit_metres = unit_metres.ok_or("an unknown unit of length (GeoKeys 3076, 3077)")?;
         Ok(Crs {
             kind: CrsKind::Projected,
+            definition: self.definition(unit_metres),
             code: self.code(PROJECTED),
             name: self.name([PROJECTED_CITATION, CITATION]),
             ellipsoid: self.ellipsoid(),
             unit_metres,
         })
+    }
+
+    /// A projection that has no code, by its own parameters.
+    fn definition(&self, unit_metres: f64) -> Option<String> {
+        if self.code(PROJECTED).is_some() {
+            return None;
+        }
+        let method = match self.shorts.get(&METHOD)? {
+            1 => Method::TransverseMercator,
+            7 => Method::Mercator,
+            8 => Method::LambertConic2,
+            9 => Method::LambertConic1,
+            10 => Method::LambertAzimuthal,
+            11 => Method::Albers,
+            15 => Method::PolarStereographic,
+            17 => Method::Equirectangular,
+            24 => Method::Sinusoidal,
+            _ => return None,
+        };
+        // Keys of natural origin, false origin, centre, and the meridian straight up from the pole.
+        let value = |keys: &[u16]| keys.iter().find_map(|key| self.doubles.get(key)).copied();
+        let projection = Projection {
+            method,
+            latitude: value(&[3081, 3085, 3089]),
+            longitude: value(&[3095, 3080, 3084, 3088]),
+            parallels: [value(&[3078]), value(&[3079])],
+            scale: value(&[3092, 3093]),
+            false_origin: [value(&[3082, 3086, 3090]), value(&[3083, 3087, 3091])],
+        };
+        let geographic = self.code(GEOGRAPHIC);
+        let base = Crs::base_parameters(geographic.as_deref(), self.ellipsoid());
+        projection.definition(&base, unit_metres)
     }
 
     /// The unit of a system whose keys name none: its name tells feet, as in "NAD83 / California zone 6 (ftUS)".
@@ -286,6 +322,30 @@ mod tests {
             (Some("EPSG:2927"), units::US_FOOT)
         );
         assert_eq!(keys.vertical_unit(), Some(units::FOOT));
+    }
+
+    #[test]
+    fn a_projection_without_a_code_is_written_out() {
+        let mut keys = GeoKeys::default();
+        keys.shorts.extend([
+            (MODEL_TYPE, 1),
+            (PROJECTED, USER_DEFINED),
+            (METHOD, 15),
+            (LINEAR_UNIT, 9001),
+        ]);
+        keys.doubles.extend([
+            (SEMI_MAJOR, 1_737_400.0),
+            (SEMI_MINOR, 1_737_400.0),
+            (3081, -90.0),
+            (3092, 1.0),
+        ]);
+        let crs = keys.crs().expect("a polar stereographic sphere");
+        assert_eq!(
+            crs.definition.as_deref(),
+            Some(
+                "+proj=stere +lat_0=-90 +lon_0=0 +k=1 +x_0=0 +y_0=0 +R=1737400 +to_meter=1 +no_defs"
+            )
+        );
     }
 
     #[test]

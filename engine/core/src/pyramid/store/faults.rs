@@ -119,6 +119,10 @@ impl<S: Store> Store for FaultStore<S> {
         self.inner.size(key)
     }
 
+    fn bytes_under(&self, folder: &str) -> Result<u64, StoreError> {
+        self.inner.bytes_under(folder)
+    }
+
     fn name(&self, key: &str) -> String {
         self.inner.name(key)
     }

@@ -1,7 +1,8 @@
 //! A folder, read with positioned reads: a file that is cut short at any moment is an error.
 
 use std::{
-    fs::File,
+    fs::{self, File},
+    io::ErrorKind,
     num::NonZero,
     ops::Range,
     path::{Path, PathBuf},
@@ -67,7 +68,30 @@ impl Store for FileStore {
             .len())
     }
 
+    fn bytes_under(&self, folder: &str) -> Result<u64, StoreError> {
+        folder_bytes(&self.path(folder)).map_err(|error| StoreError::io(&self.name(folder), error))
+    }
+
     fn name(&self, key: &str) -> String {
         self.path(key).display().to_string()
     }
+}
+
+/// Bytes of all files in a folder; none where there is no folder.
+fn folder_bytes(folder: &Path) -> std::io::Result<u64> {
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(0),
+        entries => entries?,
+    };
+    let mut sum = 0;
+    for entry in entries {
+        let entry = entry?;
+        let metadata = entry.metadata()?;
+        sum += if metadata.is_dir() {
+            folder_bytes(&entry.path())?
+        } else {
+            metadata.len()
+        };
+    }
+    Ok(sum)
 }

@@ -80,6 +80,10 @@ impl Store for MappedStore {
         self.files.size(key)
     }
 
+    fn bytes_under(&self, folder: &str) -> Result<u64, StoreError> {
+        self.files.bytes_under(folder)
+    }
+
     fn name(&self, key: &str) -> String {
         self.files.name(key)
     }

@@ -6,12 +6,18 @@
 mod faults;
 mod file;
 mod mapped;
+mod read;
+mod zip;
 
-use std::{fmt::Debug, ops::Range, sync::Arc};
+use std::{fmt::Debug, io, ops::Range, path::Path, sync::Arc};
+
+use super::PyramidError;
 
 pub use faults::{FaultStore, Faults};
 pub use file::FileStore;
 pub use mapped::MappedStore;
+pub(super) use read::StoreReader;
+pub use zip::ZipStore;
 
 /// Why a store has no bytes to give.
 #[derive(Debug, thiserror::Error)]
@@ -39,20 +45,40 @@ pub enum StoreError {
         /// The file.
         name: String,
         /// What the system said.
-        source: std::io::Error,
+        source: io::Error,
     },
 }
 
 impl StoreError {
     /// Wraps what the system said of a file.
-    fn io(name: &str, source: std::io::Error) -> Self {
+    fn io(name: &str, source: io::Error) -> Self {
         let name = name.to_owned();
         match source.kind() {
-            std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory => {
-                Self::Missing { name }
-            }
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Self::Missing { name },
             _ => Self::Io { name, source },
         }
+    }
+
+    /// For whoever speaks of streams.
+    fn into_io(self) -> io::Error {
+        match self {
+            Self::Io { source, .. } => source,
+            other => io::Error::new(io::ErrorKind::UnexpectedEof, other),
+        }
+    }
+}
+
+/// The store of a pyramid on the disk: a folder, or a ZIP archive of uncompressed members.
+///
+/// # Errors
+///
+/// [`PyramidError::Io`] where there is nothing, [`PyramidError::Invalid`] where a file is no such archive.
+pub fn open_store(path: &Path) -> Result<Box<dyn Store>, PyramidError> {
+    let about = path.metadata().map_err(PyramidError::io("opening", path))?;
+    if about.is_dir() {
+        Ok(Box::new(MappedStore::new(path)))
+    } else {
+        Ok(Box::new(ZipStore::open(path)?))
     }
 }
 
@@ -74,6 +100,13 @@ pub trait Store: Send + Sync + Debug {
     /// Where there is no such file or the system refuses.
     fn size(&self, key: &str) -> Result<u64, StoreError>;
 
+    /// Bytes of all files in a folder and below it, of all there are where it is empty; 0 where there is no such folder.
+    ///
+    /// # Errors
+    ///
+    /// Where the system refuses, or the store has no list of its files.
+    fn bytes_under(&self, folder: &str) -> Result<u64, StoreError>;
+
     /// What to call a file in a message: a path or an address.
     fn name(&self, key: &str) -> String;
 }
@@ -86,6 +119,10 @@ impl<S: Store + ?Sized> Store for Arc<S> {
 
     fn size(&self, key: &str) -> Result<u64, StoreError> {
         (**self).size(key)
+    }
+
+    fn bytes_under(&self, folder: &str) -> Result<u64, StoreError> {
+        (**self).bytes_under(folder)
     }
 
     fn name(&self, key: &str) -> String {
@@ -116,7 +153,7 @@ mod tests {
 
     use super::*;
 
-    fn stores(folder: &std::path::Path) -> [Box<dyn Store>; 2] {
+    fn stores(folder: &Path) -> [Box<dyn Store>; 2] {
         [
             Box::new(FileStore::new(folder)),
             Box::new(MappedStore::new(folder)),

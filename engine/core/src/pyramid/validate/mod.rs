@@ -4,22 +4,15 @@
 
 mod deep;
 
-use std::{
-    collections::HashMap,
-    fmt,
-    fs::{self, File},
-    io::{BufRead, BufReader, Read},
-    path::Path,
-};
+use std::{fmt, path::Path};
 
 use serde::Serialize;
 use serde_json::Value;
 
 use self::deep::Deep;
 use super::{
-    Metadata, Pyramid, PyramidError, RecordLayout, ShardInfo,
-    writer::{MANIFEST, file_hash, shard_keys},
-    zarr,
+    Metadata, Pyramid, PyramidError, ShardInfo, Store, manifest::read_manifest, store::StoreReader,
+    writer::shard_keys, zarr,
 };
 
 /// Findings beyond which only a count is kept.
@@ -84,7 +77,7 @@ impl Report {
     }
 }
 
-/// Checks the pyramid in a folder: metadata, presence and size of every shard, and if `deep` all contents.
+/// Checks the pyramid in a folder or archive: metadata, presence and size of every shard, and if `deep` all contents.
 ///
 /// `progress` is told how many steps of how many are done: shards, and if `deep` tiles.
 ///
@@ -104,8 +97,8 @@ pub fn validate(
     };
     let shards = shard_keys(metadata).count() as u64;
     let total = shards + if deep { tile_count(metadata) } else { 0 };
-    check_nodes(path, metadata, &mut report);
-    check_shards(path, metadata, &mut report, &mut |done| {
+    check_nodes(pyramid.store(), metadata, &mut report);
+    check_shards(pyramid.store(), metadata, &mut report, &mut |done| {
         progress(done, total);
     });
     if deep {
@@ -125,67 +118,47 @@ fn tile_count(metadata: &Metadata) -> u64 {
 }
 
 /// Compares the nodes of groups and arrays with what the metadata say they are.
-fn check_nodes(path: &Path, metadata: &Metadata, report: &mut Report) {
-    let mut check = |name: String, want: Vec<u8>| {
-        let path = path.join(name).join(zarr::NODE);
-        let parse = |bytes: &[u8]| serde_json::from_slice::<Value>(bytes).ok();
-        match fs::read(&path) {
-            Err(error) => report.add(format!("{}: reading failed: {error}", path.display())),
+fn check_nodes(store: &dyn Store, metadata: &Metadata, report: &mut Report) {
+    let parse = |bytes: &[u8]| serde_json::from_slice::<Value>(bytes).ok();
+    for (key, want) in zarr::nodes(metadata) {
+        let limit = zarr::ROOT_LIMIT_BYTES;
+        let read = store
+            .size(&key)
+            .and_then(|bytes| store.read(&key, 0..bytes.min(limit)));
+        match read {
+            Err(error) => report.add(error),
             Ok(bytes) if parse(&bytes) != parse(&want) => {
                 report.add(format!(
                     "{}: is not what the root's metadata ask for",
-                    path.display()
+                    store.name(&key)
                 ));
             }
             Ok(_) => {}
         }
-    };
-    check("tile".into(), zarr::group_json());
-    for (index, level) in metadata.levels.iter().enumerate() {
-        check(
-            format!("tile/{index}"),
-            zarr::tile_array_json(level.tiles, &RecordLayout::new(level)),
-        );
-    }
-    if let Some(features) = &metadata.features {
-        check("feature".into(), zarr::group_json());
-        check(
-            format!("feature/{}", features.level),
-            zarr::feature_array_json(metadata.grid.tiles(features.level), features),
-        );
-    }
-    let Some(color) = &metadata.color else { return };
-    check("color".into(), zarr::group_json());
-    for level in 0..color.levels {
-        check(
-            format!("color/{level}"),
-            zarr::color_array_json(metadata.grid.tiles(level)),
-        );
     }
 }
 
 /// Compares shards with the manifest: presence and size, and if deep BLAKE3.
 fn check_shards(
-    path: &Path,
+    store: &dyn Store,
     metadata: &Metadata,
     report: &mut Report,
     progress: &mut dyn FnMut(u64),
 ) {
-    let mut manifest = match read_manifest(&path.join(MANIFEST)) {
+    let mut manifest = match read_manifest(store) {
         Ok(manifest) => manifest,
-        Err(what) => return report.add(format!("{}: {what}", path.join(MANIFEST).display())),
+        Err(what) => return report.add(what),
     };
     for (done, key) in (0..).zip(shard_keys(metadata)) {
         progress(done);
-        let shard = path.join(&key);
         report.shard_count += 1;
-        match (manifest.remove(&key), fs::metadata(&shard)) {
-            (_, Err(error)) => report.add(format!("{}: is missing ({error})", shard.display())),
-            (None, Ok(_)) => report.add(format!("{}: is not in the manifest", shard.display())),
-            (Some(info), Ok(file)) => {
-                report.shard_bytes += file.len();
-                if let Err(what) = check_shard(&shard, &info, file.len(), report.deep) {
-                    report.add(format!("{}: {what}", shard.display()));
+        match (manifest.remove(&key), store.size(&key)) {
+            (_, Err(error)) => report.add(error),
+            (None, Ok(_)) => report.add(format!("{}: is not in the manifest", store.name(&key))),
+            (Some(info), Ok(bytes)) => {
+                report.shard_bytes += bytes;
+                if let Err(what) = check_shard(store, &info, bytes, report.deep) {
+                    report.add(format!("{}: {what}", store.name(&key)));
                 }
             }
         }
@@ -199,43 +172,25 @@ fn check_shards(
     });
 }
 
-fn check_shard(path: &Path, info: &ShardInfo, bytes: u64, deep: bool) -> Result<(), String> {
+fn check_shard(store: &dyn Store, info: &ShardInfo, bytes: u64, deep: bool) -> Result<(), String> {
     if bytes != info.bytes {
         return Err(format!(
             "has {bytes} bytes; the manifest says {}",
             info.bytes
         ));
     }
-    match deep.then(|| file_hash(path)) {
-        Some(Err(error)) => Err(format!("reading failed: {error}")),
-        Some(Ok((_, hash))) if hash != info.blake3 => {
-            Err("does not match the manifest's BLAKE3".into())
-        }
-        _ => Ok(()),
+    if !deep {
+        return Ok(());
     }
-}
-
-fn read_manifest(path: &Path) -> Result<HashMap<String, ShardInfo>, String> {
-    const LINE_LIMIT: u64 = 4096;
-    let mut file =
-        BufReader::new(File::open(path).map_err(|error| format!("reading failed: {error}"))?);
-    let mut manifest = HashMap::new();
-    for number in 1.. {
-        let mut line = Vec::new();
-        let read = file.by_ref().take(LINE_LIMIT).read_until(b'\n', &mut line);
-        if read.map_err(|error| format!("reading failed: {error}"))? == 0 {
-            break;
-        }
-        let info: ShardInfo =
-            serde_json::from_slice(&line).map_err(|error| format!("line {number}: {error}"))?;
-        if let Some(twice) = manifest.insert(info.key.clone(), info) {
-            return Err(format!(
-                "line {number}: {:?} for the second time",
-                twice.key
-            ));
-        }
+    let mut reader = StoreReader::open(store, &info.key).map_err(|error| error.to_string())?;
+    let mut hasher = blake3::Hasher::new();
+    hasher
+        .update_reader(&mut reader)
+        .map_err(|error| format!("reading failed: {error}"))?;
+    if hasher.finalize().to_hex().as_str() != info.blake3 {
+        return Err("does not match the manifest's BLAKE3".into());
     }
-    Ok(manifest)
+    Ok(())
 }
 
 #[cfg(test)]

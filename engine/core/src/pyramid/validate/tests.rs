@@ -1,11 +1,14 @@
 //! A good pyramid has no findings; every kind of damage has one that says where.
 
-use std::path::PathBuf;
+use std::{
+    fs::{self, File},
+    path::PathBuf,
+};
 
 use super::*;
 use crate::{
     geo::TileId,
-    pyramid::{PyramidWriter, Record, RecordParts, sample},
+    pyramid::{PyramidWriter, Record, RecordLayout, RecordParts, sample, writer::MANIFEST},
 };
 
 fn written(rows: u32, columns: u32) -> (tempfile::TempDir, PathBuf) {
@@ -147,7 +150,7 @@ fn nodes_and_manifest_that_say_otherwise_are_found() {
     fs::write(&manifest, text).unwrap();
     let report = check(&path, false);
     for words in [
-        "tile/0/zarr.json: reading",
+        "tile/0/zarr.json: is missing",
         "color/0/zarr.json: is not",
         "is not in the manifest",
         "etc/passwd",

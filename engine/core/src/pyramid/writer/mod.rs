@@ -13,6 +13,7 @@
 //! finished; a second run takes over what is there. Knows files and bytes; knows no heights.
 
 mod block;
+mod copy;
 mod place;
 
 use std::{
@@ -336,32 +337,9 @@ impl PyramidWriter {
     }
 
     fn write_nodes(&self, metadata: &Metadata) -> Result<(), PyramidError> {
-        let node =
-            |name: &str, text: &[u8]| write_whole(&self.folder.join(name).join(zarr::NODE), text);
-        node("tile", &zarr::group_json())?;
-        for (index, level) in metadata.levels.iter().enumerate() {
-            node(
-                &format!("tile/{index}"),
-                &zarr::tile_array_json(level.tiles, &RecordLayout::new(level)),
-            )?;
-        }
-        if let Some(features) = &metadata.features {
-            node("feature", &zarr::group_json())?;
-            node(
-                &format!("feature/{}", features.level),
-                &zarr::feature_array_json(metadata.grid.tiles(features.level), features),
-            )?;
-        }
-        let Some(color) = &metadata.color else {
-            return Ok(());
-        };
-        node("color", &zarr::group_json())?;
-        (0..color.levels).try_for_each(|level| {
-            node(
-                &format!("color/{level}"),
-                &zarr::color_array_json(metadata.grid.tiles(level)),
-            )
-        })
+        zarr::nodes(metadata)
+            .iter()
+            .try_for_each(|(key, text)| write_whole(&self.folder.join(key), text))
     }
 
     fn write_manifest(&self, shards: &[ShardInfo]) -> Result<(), PyramidError> {
