@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
 
@@ -24,6 +25,19 @@ def arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
+def cluster(asked: argparse.Namespace, task_bytes: int) -> LocalCluster:
+    """Processes on this machine, which share what memory there may be."""
+    resources = {}
+    if asked.memory:
+        resources["memory"] = asked.memory // asked.workers
+        if task_bytes > resources["memory"]:
+            raise ValueError(
+                f"a task takes {task_bytes} bytes, and {asked.workers} workers have {resources['memory']} each; "
+                "fewer workers, or a plan with a smaller --memory-budget"
+            )
+    return LocalCluster(n_workers=asked.workers, threads_per_worker=1, processes=True, resources=resources)
+
+
 def bar(done: int, count: int) -> None:
     """A line that is drawn over itself on a terminal, and one a tenth of the way elsewhere."""
     width = 40 * done // count
@@ -37,19 +51,13 @@ def main() -> int:
     asked = arguments()
     try:
         plan = read_plan(asked.plan)
-        if asked.scheduler:
-            client = Client(asked.scheduler)
-        else:
-            resources = {"memory": asked.memory // asked.workers} if asked.memory else {}
-            if asked.memory and plan.memory_bytes > resources["memory"]:
-                raise ValueError(
-                    f"a task takes {plan.memory_bytes} bytes, and {asked.workers} workers have {resources['memory']} each; "
-                    "fewer workers, or a plan with a smaller --memory-budget"
-                )
-            client = Client(LocalCluster(asked.workers, threads_per_worker=1, processes=True, resources=resources))
-        with client:
+        with contextlib.ExitStack() as stack:
+            where = asked.scheduler or stack.enter_context(cluster(asked, plan.memory_bytes))
+            client = stack.enter_context(Client(where))
+            client.wait_for_workers(1)
             print(f"dashboard: {client.dashboard_link}", file=sys.stderr)
-            build(client, plan, drumlin=asked.drumlin, retries=asked.retries, progress=(lambda *_: None) if asked.quiet else bar)
+            progress = (lambda *_: None) if asked.quiet else bar
+            build(client, plan, drumlin=asked.drumlin, retries=asked.retries, progress=progress)
     except (TaskError, ValueError, OSError) as error:
         print(f"drumlin_dask: {error}", file=sys.stderr)
         return 1

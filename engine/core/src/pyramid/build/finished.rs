@@ -8,8 +8,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::options::BuildReport;
-use crate::pyramid::writer::manifest;
-use crate::pyramid::{PyramidError, write_whole};
+use crate::pyramid::manifest::read_manifest;
+use crate::pyramid::{FileStore, PyramidError, ShardInfo, write_whole};
 
 /// Where it is, from the root.
 const FILE: &str = "manifest/build.json";
@@ -51,10 +51,11 @@ pub(super) fn report(pyramid: &Path, fingerprint: &str) -> Option<BuildReport> {
     }
     let text = fs::read(pyramid.join(FILE)).ok()?;
     let finished: Finished = serde_json::from_slice(&text).ok()?;
-    let there = |info: &crate::pyramid::ShardInfo| {
+    let there = |info: &ShardInfo| {
         fs::metadata(pyramid.join(&info.key)).is_ok_and(|about| about.len() == info.bytes)
     };
-    let whole = || manifest(pyramid).is_some_and(|shards| shards.iter().all(there));
+    let manifest = || read_manifest(&FileStore::new(pyramid));
+    let whole = || manifest().is_ok_and(|shards| shards.values().all(there));
     (finished.key == key(fingerprint) && whole()).then_some(BuildReport {
         unchanged: true,
         ..finished.report

@@ -410,17 +410,6 @@ fn read_journal(folder: &Path) -> Result<HashMap<String, ShardInfo>, PyramidErro
     Ok(infos.map(|info| (info.key.clone(), info)).collect())
 }
 
-/// The manifest of a pyramid; none where it cannot be read.
-pub(super) fn manifest(pyramid: &Path) -> Option<Vec<ShardInfo>> {
-    let text = fs::read(pyramid.join(MANIFEST)).ok()?;
-    let lines = text
-        .split(|byte| *byte == b'\n')
-        .filter(|line| !line.is_empty());
-    lines
-        .map(|line| serde_json::from_slice(line).ok())
-        .collect()
-}
-
 /// Says which shard of the levels is not in the list.
 fn check_complete(metadata: &Metadata, shards: &[ShardInfo]) -> Result<(), String> {
     let known: HashMap<&str, &ShardInfo> = shards
