@@ -43,7 +43,10 @@ pub(crate) fn python() -> Result<PathBuf> {
     let ready = || {
         succeeds(&mut command(
             &python,
-            &["-c", "import distributed, numpy, zarr; assert zarr.__version__ >= '3'"],
+            &[
+                "-c",
+                "import distributed, numpy, zarr; assert zarr.__version__ >= '3'",
+            ],
         ))
     };
     if ready() {

@@ -33,9 +33,7 @@ use self::{
 };
 use super::{
     COLOR_TEXELS, ColorCodec, Metadata, PyramidError, RecordLayout,
-    files::{
-        remove_folder, sibling, sync_folder, unique, write_whole, write_whole_as, write_whole_with,
-    },
+    files::{remove_folder, sibling, sync_folder, unique, write_whole, write_whole_as},
     shard::shard_count,
     zarr,
 };
