@@ -96,7 +96,7 @@ pub fn build(
     let writer = PyramidWriter::resume(&options.output, options.overwrite, &plan.fingerprint)?;
     let watch = Watch::new(progress, cancel);
     if writer.started_over() {
-        watch.stage(Stage::StartOver, 0)(0)?;
+        drop(watch.stage(Stage::StartOver, 0));
     }
     let report = plan.carry_out(raster, imagery, options, (writer, Want::Whole), &watch)?;
     Ok(BuildReport {
