@@ -6,11 +6,6 @@
 //!
 //! Based on: Lin, Wang, Sun, *Improved feature-adaptive subdivision for Catmull-Clark surface model* (2018), Table 1.
 
-#![expect(
-    clippy::cast_possible_truncation,
-    reason = "positions of experiments are rounded to f32 on purpose"
-)]
-
 mod rows;
 
 use std::path::{Path, PathBuf};
