@@ -93,6 +93,17 @@ pub struct ColorMetadata {
     pub sources: Vec<SourceMetadata>,
 }
 
+/// What a build of named sources made, so that the same build again has nothing to do.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BuildMetadata {
+    /// BLAKE3 of all that decides the bytes (inputs, options, builder), in hexadecimal.
+    pub key: String,
+    /// Finest samples that are void.
+    pub void_samples: u64,
+    /// The root tile's true error in metres.
+    pub root_error: f64,
+}
+
 /// What a pyramid says of itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Metadata {
@@ -119,6 +130,9 @@ pub struct Metadata {
     pub features: Option<FeatureMetadata>,
     /// What it was built from, in the order given.
     pub sources: Vec<SourceMetadata>,
+    /// Its build, where it was built of named sources.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub build: Option<BuildMetadata>,
 }
 
 impl Metadata {

@@ -36,7 +36,9 @@ pub use export::export_geotiff;
 pub use feature::{FeatureGroup, FeatureMetadata};
 pub use files::{write_whole, write_whole_with};
 pub use heights::LevelHeights;
-pub use metadata::{ColorCodec, ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};
+pub use metadata::{
+    BuildMetadata, ColorCodec, ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference,
+};
 pub use pack::{pack, unpack};
 pub use patch_code::{HALF_OCTAVES, NEVER, patch_error, patch_nibble};
 pub use reader::Pyramid;

@@ -49,6 +49,7 @@ pub(super) fn metadata(rows: u32, columns: u32) -> Metadata {
     };
     Metadata {
         version: Metadata::VERSION,
+        build: None,
         grid,
         crs: Crs {
             code: Some("EPSG:32610".into()),

@@ -53,6 +53,7 @@ impl Synthetic {
         };
         let metadata = Metadata {
             version: Metadata::VERSION,
+            build: None,
             grid,
             crs: Crs::unknown(),
             vertical: VerticalReference::Unknown,

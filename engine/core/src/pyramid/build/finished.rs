@@ -1,67 +1,66 @@
-//! What a finished pyramid says of its build, so that the same build again has nothing to do.
-//!
-//! `manifest/build.json` is no part of what readers need: a pyramid without it is as good.
+//! What a finished pyramid tells of its build, so that the same build again has nothing to do.
 
-use std::fs;
 use std::path::Path;
-
-use serde::{Deserialize, Serialize};
 
 use super::options::BuildReport;
 use crate::pyramid::manifest::read_manifest;
-use crate::pyramid::{FileStore, PyramidError, ShardInfo, write_whole};
-
-/// Where it is, from the root.
-const FILE: &str = "manifest/build.json";
-
-#[derive(Serialize, Deserialize)]
-struct Finished {
-    /// BLAKE3 of the fingerprint, in hexadecimal.
-    key: String,
-    /// What was made, but for what depends on the run.
-    report: BuildReport,
-}
-
-/// Writes it to a folder that is not published yet.
-pub(super) fn note(
-    folder: &Path,
-    fingerprint: &str,
-    report: &BuildReport,
-) -> Result<(), PyramidError> {
-    let path = folder.join(FILE);
-    let report = BuildReport {
-        memory_bytes: 0,
-        kept_tasks: 0,
-        seconds: 0.0,
-        ..report.clone()
-    };
-    let finished = Finished {
-        key: key(fingerprint),
-        report,
-    };
-    let text = serde_json::to_vec(&finished)
-        .map_err(|error| PyramidError::io("writing", &path)(error.into()))?;
-    write_whole(&path, &text)
-}
+use crate::pyramid::{BuildMetadata, Metadata, Pyramid, ShardInfo};
 
 /// The report of a pyramid that was built of the same, where all its shards are there.
 pub(super) fn report(pyramid: &Path, fingerprint: &str) -> Option<BuildReport> {
-    if fingerprint.is_empty() {
+    if fingerprint.is_empty() || !pyramid.is_dir() {
         return None;
     }
-    let text = fs::read(pyramid.join(FILE)).ok()?;
-    let finished: Finished = serde_json::from_slice(&text).ok()?;
+    let pyramid = Pyramid::open(pyramid).ok()?;
+    let metadata = pyramid.metadata();
+    let build = metadata.build.as_ref()?;
+    if build.key != key(fingerprint) {
+        return None;
+    }
+    let shards: Vec<ShardInfo> = read_manifest(pyramid.store()).ok()?.into_values().collect();
     let there = |info: &ShardInfo| {
-        fs::metadata(pyramid.join(&info.key)).is_ok_and(|about| about.len() == info.bytes)
+        let size = pyramid.store().size(&info.key);
+        size.is_ok_and(|size| size == info.bytes)
     };
-    let manifest = || read_manifest(&FileStore::new(pyramid));
-    let whole = || manifest().is_ok_and(|shards| shards.values().all(there));
-    (finished.key == key(fingerprint) && whole()).then_some(BuildReport {
+    shards.iter().all(there).then(|| BuildReport {
         unchanged: true,
-        ..finished.report
+        ..of(metadata, build, &shards)
     })
 }
 
-fn key(fingerprint: &str) -> String {
+/// What a build made, but for what depends on the run.
+pub(super) fn of(metadata: &Metadata, build: &BuildMetadata, shards: &[ShardInfo]) -> BuildReport {
+    let bytes = |prefix: &str| -> u64 {
+        let under = shards.iter().filter(|info| info.key.starts_with(prefix));
+        under.map(|info| info.bytes).sum()
+    };
+    let tiles = shards.iter().filter(|info| info.key.starts_with("tile/"));
+    let grid = &metadata.grid;
+    BuildReport {
+        samples: [grid.rows, grid.columns],
+        void_samples: build.void_samples,
+        source_bytes: metadata.sources.iter().map(|source| source.bytes).sum(),
+        levels: grid.level_count(),
+        tiles: tiles.map(|info| u64::from(info.chunks)).sum(),
+        eps: metadata.eps,
+        unit: metadata.unit(),
+        root_error: build.root_error,
+        level_bytes: (0..grid.level_count())
+            .map(|level| bytes(&format!("tile/{level}/")))
+            .collect(),
+        height_bytes: bytes("tile/"),
+        features: metadata
+            .features
+            .as_ref()
+            .map_or(0, |features| features.groups),
+        feature_bytes: bytes("feature/"),
+        color_levels: metadata.color.as_ref().map_or(0, |color| color.levels),
+        color_bytes: bytes("color/") + bytes("alpha/"),
+        ..BuildReport::default()
+    }
+}
+
+/// BLAKE3 of a build's fingerprint, in hexadecimal.
+pub(super) fn key(fingerprint: &str) -> String {
     blake3::hash(fingerprint.as_bytes()).to_hex().to_string()
 }

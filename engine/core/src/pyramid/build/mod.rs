@@ -61,7 +61,7 @@ use self::plan::Shape;
 use self::records::Records;
 use self::scale::Scale;
 use self::tasks::{Job, Tasks, Want};
-use super::{ColorMetadata, Metadata, PyramidError, PyramidWriter, ShardInfo};
+use super::{BuildMetadata, ColorMetadata, Metadata, PyramidError, PyramidWriter, ShardInfo};
 use crate::dem::{DemError, Image, Raster};
 use crate::geo::Grid;
 
@@ -173,15 +173,12 @@ impl Plan {
                 if want == Want::Finish {
                     check_there(writer.folder(), &shards)?;
                 }
-                let report = BuildReport {
+                writer.publish(&metadata, &shards)?;
+                Ok(Some(BuildReport {
+                    memory_bytes: self.shape.memory_bytes,
                     kept_tasks: tasks.kept.load(Ordering::Relaxed),
                     ..report
-                };
-                if !self.fingerprint.is_empty() {
-                    finished::note(writer.folder(), &self.fingerprint, &report)?;
-                }
-                writer.publish(&metadata, &shards)?;
-                Ok(Some(report))
+                }))
             }
             Err(PyramidError::Interrupted) if tasks.done.load(Ordering::Relaxed) => Ok(None),
             Err(error) => {
@@ -222,22 +219,20 @@ impl Plan {
         };
         let (mut shards, root_error) = records.write(writer, &scratch, tasks)?;
         let height_range = errors.height_range;
-        let mut report = self.report(options, &shards, f64::from(root_error));
-        report.void_samples = levels.void_count;
-        let feature_shards = features.write(grid, writer, tasks)?;
-        report.features = features.count();
-        report.feature_bytes = feature_shards.iter().map(|info| info.bytes).sum();
-        shards.extend(feature_shards);
+        shards.extend(features.write(grid, writer, tasks)?);
         let color = imagery
             .map(|imagery| self.color(imagery, writer, tasks))
             .transpose()?
             .map(|(color, infos)| {
-                report.color_levels = color.levels;
-                report.color_bytes = infos.iter().map(|info| info.bytes).sum();
                 shards.extend(infos);
                 color
             });
-        let metadata = Metadata {
+        let build = BuildMetadata {
+            key: finished::key(&self.fingerprint),
+            void_samples: levels.void_count,
+            root_error: f64::from(root_error),
+        };
+        let mut metadata = Metadata {
             version: Metadata::VERSION,
             grid: *grid,
             crs: raster.header().crs.clone(),
@@ -249,7 +244,10 @@ impl Plan {
             color,
             features: features.metadata(),
             sources: options.sources.clone(),
+            build: None,
         };
+        let report = finished::of(&metadata, &build, &shards);
+        metadata.build = (!self.fingerprint.is_empty()).then_some(build);
         Ok((metadata, shards, report))
     }
 
@@ -278,33 +276,6 @@ impl Plan {
             PyramidError::Refused("the imagery of an earlier run was not understood".into())
         })?;
         Ok((color, made.shards))
-    }
-
-    fn report(&self, options: &BuildOptions, shards: &[ShardInfo], root_error: f64) -> BuildReport {
-        let grid = &self.grid;
-        let level_bytes: Vec<u64> = (0..grid.level_count())
-            .map(|level| {
-                let prefix = format!("tile/{level}/");
-                shards
-                    .iter()
-                    .filter(|info| info.key.starts_with(&prefix))
-                    .map(|info| info.bytes)
-                    .sum()
-            })
-            .collect();
-        BuildReport {
-            samples: [grid.rows, grid.columns],
-            source_bytes: options.sources.iter().map(|source| source.bytes).sum(),
-            levels: grid.level_count(),
-            tiles: shards.iter().map(|info| u64::from(info.chunks)).sum(),
-            eps: self.scale.eps,
-            unit: self.scale.unit(),
-            root_error,
-            height_bytes: level_bytes.iter().sum(),
-            level_bytes,
-            memory_bytes: self.shape.memory_bytes,
-            ..BuildReport::default()
-        }
     }
 }
 

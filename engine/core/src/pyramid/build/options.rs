@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::inputs::InputStamp;
 use crate::dem::Image;
@@ -96,7 +96,7 @@ pub struct Progress {
 }
 
 /// What a build made.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct BuildReport {
     /// Rows and columns of finest samples.
     pub samples: [u32; 2],
