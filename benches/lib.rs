@@ -13,6 +13,7 @@ pub mod errors;
 pub mod heights;
 pub mod measure;
 pub mod peer;
+pub mod picture;
 pub mod plot;
 pub mod quadtree;
 pub mod scheme;

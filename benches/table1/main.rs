@@ -1,12 +1,13 @@
 //! Classic against adaptive refinement at the same worst error, on four cages with the counts of the paper's Table 1.
 //!
 //! ```text
-//! cargo run --release -p drumlin-benches --bin table1 -- [--cages FOLDER] [--json FILE]
+//! cargo run --release -p drumlin-benches --bin table1 -- [--cages FOLDER] [--json FILE] [--pictures FOLDER]
 //! ```
 //!
 //! Based on: Lin, Wang, Sun, *Improved feature-adaptive subdivision for Catmull-Clark surface model* (2018), Table 1.
 
 mod rows;
+mod seen;
 
 use std::path::{Path, PathBuf};
 
@@ -20,6 +21,8 @@ use drumlin_benches::{
 };
 use drumlin_core::cage::{Cage, CageBudget, read_obj};
 use serde::Serialize;
+
+use crate::seen::Seen;
 
 /// The paper's models; the cages have their counts, not their shape.
 const NAMES: [&str; 4] = ["hippo", "crocodile", "gorilla", "koala"];
@@ -46,6 +49,9 @@ struct Arguments {
     /// Writes all figures.
     #[arg(long)]
     json: Option<PathBuf>,
+    /// Writes the pictures that are compared, as PNG.
+    #[arg(long)]
+    pictures: Option<PathBuf>,
 }
 
 /// Everything, as JSON.
@@ -70,6 +76,7 @@ struct Case {
     adaptive: Scheme,
     /// Greatest distance from the limit of both.
     worst_errors: [f64; 2],
+    seen: Seen,
 }
 
 impl Case {
@@ -118,6 +125,7 @@ fn case(name: &'static str, arguments: &Arguments) -> Result<Case> {
         classic: scheme::measure(&cage, &same, runs)?,
         adaptive: scheme::measure(&cage, &own, runs)?,
         worst_errors,
+        seen: Seen::new(name, &cage, arguments.pictures.as_deref())?,
     })
 }
 
