@@ -6,6 +6,7 @@ mod cages;
 mod commands;
 mod embed;
 mod export;
+mod faults;
 mod features;
 mod flight;
 mod golden;

@@ -5,7 +5,7 @@ use std::{error::Error, process::ExitCode};
 use drumlin_core::{cage::CageError, dem::DemError, pyramid::PyramidError};
 
 /// What every verb's help says of its exit code.
-pub const EXIT_CODES: &str = "Exit codes: 0 done, 1 invalid data, 2 wrong usage, 3 input or output failed, 4 interrupted (run again to go on)";
+pub const EXIT_CODES: &str = "Exit codes: 0 done, 1 invalid data, 2 wrong usage, 3 input or output failed, 4 stopped (run again to go on)";
 
 /// How a verb ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub enum Outcome {
     Usage,
     /// The system refused to read or write.
     Io,
-    /// Stopped on request; a second run goes on.
+    /// Stopped on request, or by the system in the middle; a second run goes on.
     Interrupted,
     /// How another program ended.
     Code(u8),
@@ -58,7 +58,9 @@ impl Outcome {
         match error {
             PyramidError::Io { .. } | PyramidError::Dem(DemError::Io { .. }) => Self::Io,
             PyramidError::Refused(_) => Self::Usage,
-            PyramidError::Interrupted | PyramidError::Changed(_) => Self::Interrupted,
+            PyramidError::Interrupted | PyramidError::Stopped(_) | PyramidError::Changed(_) => {
+                Self::Interrupted
+            }
             _ => Self::InvalidData,
         }
     }
@@ -123,6 +125,8 @@ mod tests {
             Outcome::InvalidData
         );
         assert_eq!(code(PyramidError::Interrupted.into()), Outcome::Interrupted);
+        let stopped = PyramidError::Stopped(PyramidError::io("writing", "a")(io()).into());
+        assert_eq!(code(stopped.into()), Outcome::Interrupted);
         assert_eq!(
             code(
                 DemError::Io {

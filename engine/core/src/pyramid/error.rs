@@ -46,6 +46,9 @@ pub enum PyramidError {
     /// An input is not what it was when the build began.
     #[error("{path}: changed while it was read; a second run builds from what it is now", path = .0.display())]
     Changed(PathBuf),
+    /// The system refused to read or write in the middle of a build.
+    #[error("{0}; what is done is kept, and a second run goes on with it")]
+    Stopped(Box<Self>),
     /// The caller asked to stop.
     #[error("interrupted; a second run completes the build")]
     Interrupted,

@@ -3,10 +3,13 @@
 //! Shards begin at multiples of 4 KiB, so that a map of the archive serves them as it would serve files. The same
 //! pyramid gives the same archive. Both ways every shard is compared with the manifest before the result has a name.
 
+mod output;
+
 use std::{fs::File, path::Path};
 
 use zip::{CompressionMethod, DateTime, ZipWriter, result::ZipError, write::SimpleFileOptions};
 
+use self::output::Output;
 use super::{
     Pyramid, PyramidError, PyramidWriter, ShardInfo, StoreError,
     files::copy_hashed,
@@ -34,7 +37,7 @@ pub fn pack(
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<(), PyramidError> {
     let mut archive = Archive {
-        zip: ZipWriter::new(file),
+        zip: ZipWriter::new(Output::new(file)),
         pyramid,
         path,
     };
@@ -83,7 +86,7 @@ pub fn unpack(
 }
 
 struct Archive<'a> {
-    zip: ZipWriter<&'a mut File>,
+    zip: ZipWriter<Output<'a>>,
     pyramid: &'a Pyramid,
     path: &'a Path,
 }

@@ -77,7 +77,8 @@ const BUILDER: u32 = 2;
 /// # Errors
 /// [`PyramidError::Refused`] for options that cannot be met or an output that is something else;
 /// [`PyramidError::Unfit`] for heights out of range, a raster that is all void, or features that cannot be laid;
-/// [`PyramidError::Dem`] where an input fails; [`PyramidError::Io`] where writing does; [`PyramidError::Interrupted`].
+/// [`PyramidError::Dem`] where an input is not what it should be; [`PyramidError::Stopped`] where reading or writing
+/// fails, [`PyramidError::Io`] where sources have no names; [`PyramidError::Interrupted`].
 /// Nothing is called by the output's name unless it is whole.
 pub fn build(
     raster: &dyn Raster,
@@ -173,7 +174,8 @@ impl Plan {
                 if want == Want::Finish {
                     check_there(writer.folder(), &shards)?;
                 }
-                writer.publish(&metadata, &shards)?;
+                let published = writer.publish(&metadata, &shards);
+                published.map_err(|error| self.stopped(error))?;
                 Ok(Some(BuildReport {
                     memory_bytes: self.shape.memory_bytes,
                     kept_tasks: tasks.kept.load(Ordering::Relaxed),
@@ -182,18 +184,28 @@ impl Plan {
             }
             Err(PyramidError::Interrupted) if tasks.done.load(Ordering::Relaxed) => Ok(None),
             Err(error) => {
-                let resumable = matches!(
-                    error,
-                    PyramidError::Interrupted
-                        | PyramidError::Io { .. }
-                        | PyramidError::Dem(DemError::Io { .. })
-                );
+                let error = self.stopped(error);
+                let resumable =
+                    matches!(error, PyramidError::Interrupted | PyramidError::Stopped(_));
                 if want == Want::Whole && (!resumable || self.fingerprint.is_empty()) {
                     // The first error is the one to tell; what cannot be removed now, the next run removes.
                     let _ = writer.discard();
                 }
                 Err(error)
             }
+        }
+    }
+
+    /// What a failure to read or write is to a build that the next run goes on with.
+    fn stopped(&self, error: PyramidError) -> PyramidError {
+        let failed = matches!(
+            error,
+            PyramidError::Io { .. } | PyramidError::Dem(DemError::Io { .. })
+        );
+        if failed && !self.fingerprint.is_empty() {
+            PyramidError::Stopped(error.into())
+        } else {
+            error
         }
     }
 

@@ -14,8 +14,16 @@ use crate::pyramid::{
 };
 
 /// True for a folder with a pyramid's root in it, of whatever version.
-pub(super) fn is_pyramid(path: &Path) -> bool {
-    fs::read(path.join(zarr::NODE)).is_ok_and(|bytes| zarr::is_root(&bytes))
+pub(super) fn is_pyramid(path: &Path) -> Result<bool, PyramidError> {
+    let root = path.join(zarr::NODE);
+    match fs::read(&root) {
+        Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
+            Ok(false)
+        }
+        read => Ok(zarr::is_root(
+            &read.map_err(PyramidError::io("reading", root))?,
+        )),
+    }
 }
 
 /// Refuses what is no name, and what must not be replaced.
@@ -29,7 +37,7 @@ pub(in crate::pyramid) fn check_target(path: &Path, overwrite: bool) -> Result<(
     match path.symlink_metadata() {
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
         Err(error) => Err(PyramidError::io("looking at", path)(error)),
-        Ok(_) if !is_pyramid(path) => Err(PyramidError::Refused(format!(
+        Ok(_) if !is_pyramid(path)? => Err(PyramidError::Refused(format!(
             "{}: exists and is not a Drumlin pyramid; it was left as it is",
             path.display()
         ))),
@@ -44,7 +52,7 @@ pub(in crate::pyramid) fn check_target(path: &Path, overwrite: bool) -> Result<(
 /// Ends a replacement that was killed between its steps: the old pyramid gets its name back, or goes.
 pub(super) fn settle_replacement(path: &Path) -> Result<(), PyramidError> {
     let replaced = sibling(path, ".replaced");
-    if !is_pyramid(&replaced) {
+    if !is_pyramid(&replaced)? {
         return Ok(());
     }
     if path.symlink_metadata().is_ok() {
@@ -61,7 +69,7 @@ pub(super) fn claim(folder: &Path) -> Result<File, PyramidError> {
     match fs::create_dir(folder) {
         Err(error) if error.kind() == ErrorKind::AlreadyExists => {
             if !marker.is_file()
-                && !is_pyramid(folder)
+                && !is_pyramid(folder)?
                 && fs::read_dir(folder).is_ok_and(|mut it| it.next().is_some())
             {
                 return Err(refused(
