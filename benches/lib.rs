@@ -9,6 +9,7 @@
 )]
 
 pub mod cap_errors;
+pub mod device;
 pub mod errors;
 pub mod heights;
 pub mod measure;

@@ -143,7 +143,8 @@ fn draw(blocks: &Blocks, positions: &Positions<f32>, pattern: &PatchPattern<f32>
     });
 }
 
-fn drawn_places() -> Vec<[f64; 2]> {
+/// Places of a patch at which it is drawn.
+pub(crate) fn drawn_places() -> Vec<[f64; 2]> {
     let step = |index: u32| f64::from(index) / f64::from(DRAWN - 1);
     let row = |v: u32| (0..DRAWN).map(move |u| [step(u), step(v)]);
     (0..DRAWN).flat_map(row).collect()

@@ -1,7 +1,7 @@
 //! Classic against adaptive refinement at the same worst error, on four cages with the counts of the paper's Table 1.
 //!
 //! ```text
-//! cargo run --release -p drumlin-benches --bin table1 -- [--cages FOLDER] [--json FILE] [--pictures FOLDER]
+//! cargo run --release -p drumlin-benches --bin table1 -- [--cages FOLDER] [--json FILE] [--pictures FOLDER] [--gpu]
 //! ```
 //!
 //! Based on: Lin, Wang, Sun, *Improved feature-adaptive subdivision for Catmull-Clark surface model* (2018), Table 1.
@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, Result};
 use clap::Parser;
 use drumlin_benches::{
+    device::{self, About, Device, Execution},
     errors::{Errors, blocks_at, depths_within, mean_edge_length},
     measure::{self, Machine, geometric_mean},
     scheme::{self, Scheme},
@@ -49,6 +50,9 @@ struct Arguments {
     /// Writes all figures.
     #[arg(long)]
     json: Option<PathBuf>,
+    /// Times the points and vertices of both on the graphics device too.
+    #[arg(long)]
+    gpu: bool,
     /// Writes the pictures that are compared, as PNG.
     #[arg(long)]
     pictures: Option<PathBuf>,
@@ -58,6 +62,8 @@ struct Arguments {
 #[derive(Serialize)]
 struct Report {
     machine: Machine,
+    /// Where one was asked for.
+    device: Option<About>,
     /// In mean edge lengths.
     bound: f64,
     cages: Vec<Case>,
@@ -77,6 +83,8 @@ struct Case {
     /// Greatest distance from the limit of both.
     worst_errors: [f64; 2],
     seen: Seen,
+    /// Both on a graphics device.
+    executions: [Execution; 2],
 }
 
 impl Case {
@@ -88,11 +96,16 @@ impl Case {
 
 fn main() -> Result<()> {
     let arguments = Arguments::parse();
-    let cases = NAMES.map(|name| case(name, &arguments).with_context(|| name.to_owned()));
+    let device = arguments.gpu.then(Device::new).transpose()?;
+    let case = |name: &'static str| {
+        case(name, &arguments, device.as_ref()).with_context(|| name.to_owned())
+    };
+    let cases = NAMES.map(case);
     let cages = cases.into_iter().collect::<Result<Vec<_>>>()?;
     let ratios: Vec<_> = cages.iter().map(Case::total_ratio).collect();
     let report = Report {
         machine: Machine::here(),
+        device: device.as_ref().map(Device::about),
         bound: arguments.bound,
         total_ratio: geometric_mean(&ratios),
         cages,
@@ -104,7 +117,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-fn case(name: &'static str, arguments: &Arguments) -> Result<Case> {
+fn case(name: &'static str, arguments: &Arguments, device: Option<&Device>) -> Result<Case> {
     let cage = read(&arguments.cages.join(format!("table1_{name}.obj")))?;
     let mean_edge_length = mean_edge_length(&cage);
     let bound = arguments.bound * mean_edge_length;
@@ -117,6 +130,8 @@ fn case(name: &'static str, arguments: &Arguments) -> Result<Case> {
     let mut check = Errors::new(&cage, CHECK_STEPS)?;
     let worst_errors = [check.worst(&same())?, check.worst(&own())?];
     let runs = usize::from(arguments.runs);
+    let execution = |depths: Vec<u8>| device::execution(&cage, &depths, device, runs);
+    let executions = [execution(same())?, execution(own())?];
     Ok(Case {
         name,
         cage: cage_counts(&cage),
@@ -125,6 +140,7 @@ fn case(name: &'static str, arguments: &Arguments) -> Result<Case> {
         classic: scheme::measure(&cage, &same, runs)?,
         adaptive: scheme::measure(&cage, &own, runs)?,
         worst_errors,
+        executions,
         seen: Seen::new(name, &cage, arguments.pictures.as_deref())?,
     })
 }

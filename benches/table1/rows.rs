@@ -2,7 +2,10 @@
 
 use std::fmt::Write as _;
 
-use drumlin_benches::measure::{Table, thousands, three_digits};
+use drumlin_benches::{
+    device,
+    measure::{Table, thousands, three_digits},
+};
 
 use crate::{Case, Report};
 
@@ -20,6 +23,8 @@ const NOTES: &str = "\
 * Drawing: controls gathered, positions and derivatives in f32 at 5 x 5 places of every patch, on the processor. No
   triangles are put together and no pixels filled.
 * Feature patches: those of levels from 2 on, and caps.
+* On a device: the stage `refine` makes all points, and position and normal at 5 x 5 places of every patch. Bytes are
+  those of rows read, of points gathered (each as often as a row names it) and of points written.
 * One thread by its own clock, so that other work on the machine does not count; all threads by the clock on the wall.
 * The cages have the paper's counts (faces, irregular faces, irregular points), not its models, and the paper's times
   are of another machine: of its columns only the ratio of totals, 1.48 to 2.04, may be set beside ours.
@@ -34,6 +39,8 @@ pub(crate) fn text(report: &Report) -> String {
     // Writing into a string cannot fail.
     let _ = write!(text, "\n{}\n", ratios(report).text());
     let _ = writeln!(text, "{}", pictures(report).text());
+    let device = device::line(report.device.as_ref());
+    let _ = writeln!(text, "{device}\n\n{}", executions(report).text());
     let mean = three_digits(report.total_ratio);
     let _ = write!(
         text,
@@ -137,6 +144,19 @@ fn pictures(report: &Report) -> Table {
             case.seen.deepest.to_string(),
             format!("{:.1e}", case.seen.difference),
         ]);
+    }
+    table
+}
+
+/// Both on a graphics device.
+fn executions(report: &Report) -> Table {
+    let mut table = Table::new(&device::COLUMNS);
+    for case in &report.cages {
+        let schemes = [("classic", &case.classic), ("adaptive", &case.adaptive)];
+        for ((way, scheme), execution) in schemes.into_iter().zip(&case.executions) {
+            let name = format!("{}, {way} {}", case.name, scheme.deepest);
+            table.row(device::row(&name, execution, report.device.as_ref()));
+        }
     }
     table
 }

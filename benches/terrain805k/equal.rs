@@ -3,6 +3,7 @@
 use anyhow::Result;
 use drumlin_benches::{
     cap_errors,
+    device::{self, Device, Execution},
     errors::{FeatureErrors, depths_within, mean_edge_length},
     scheme::{self, Scheme},
 };
@@ -22,10 +23,16 @@ pub(crate) struct Row {
     pub(crate) name: &'static str,
     pub(crate) worst_error: f64,
     pub(crate) scheme: Scheme,
+    pub(crate) execution: Execution,
 }
 
 /// Measures classic at `depth`, and the least depth each that leaves no more.
-pub(crate) fn measure(cage: &Cage, depth: u8, runs: usize) -> Result<Equal> {
+pub(crate) fn measure(
+    cage: &Cage,
+    depth: u8,
+    runs: usize,
+    device: Option<&Device>,
+) -> Result<Equal> {
     let vertices = cage.positions().len();
     let errors = cap_errors::by_feature(cage, depth)?;
     let worst = |depths: &[u8]| {
@@ -42,11 +49,13 @@ pub(crate) fn measure(cage: &Cage, depth: u8, runs: usize) -> Result<Equal> {
                 name: "classic, one for all",
                 worst_error: bound,
                 scheme: scheme::measure(cage, &same, runs)?,
+                execution: device::execution(cage, &same(), device, runs)?,
             },
             Row {
                 name: "adaptive",
                 worst_error: worst(&own()),
                 scheme: scheme::measure(cage, &own, runs)?,
+                execution: device::execution(cage, &own(), device, runs)?,
             },
         ],
     })

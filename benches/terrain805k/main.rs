@@ -25,6 +25,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Parser;
 use drumlin_benches::{
+    device::{About, Device},
     heights::Heights,
     measure::{self, Machine, Timing},
     terrain_cage::{CageCounts, PAPER_QUADS, cage_counts, terrain_cage},
@@ -57,6 +58,9 @@ struct Arguments {
     /// Writes all figures.
     #[arg(long)]
     json: Option<PathBuf>,
+    /// Times the points of both at equal error on the graphics device too.
+    #[arg(long)]
+    gpu: bool,
     /// Draws the totals along the path as a PNG.
     #[arg(long)]
     plot: Option<PathBuf>,
@@ -66,6 +70,8 @@ struct Arguments {
 #[derive(Serialize)]
 struct Report {
     machine: Machine,
+    /// Where one was asked for.
+    device: Option<About>,
     cage: CageCounts,
     equal: equal::Equal,
     path: view::Path,
@@ -81,8 +87,9 @@ fn main() -> Result<()> {
     let ground = |[x, y]: [f64; 2]| heights.at([x / width + 0.5, 0.5 - y / height]);
     let stations = path::stations(usize::from(arguments.stations), width.min(height), ground);
     let runs = usize::from(arguments.runs);
+    let device = arguments.gpu.then(Device::new).transpose()?;
     eprintln!("at equal worst error");
-    let equal = equal::measure(&cage, arguments.depth, runs)?;
+    let equal = equal::measure(&cage, arguments.depth, runs, device.as_ref())?;
     eprintln!("along the path");
     let path = view::measure(&cage, &stations, runs)?;
     let rebuilds = path
@@ -100,6 +107,7 @@ fn main() -> Result<()> {
     let tiles = tiles::measure(&arguments.dem, &stations, ERROR_PX, runs)?;
     let report = Report {
         machine: Machine::here(),
+        device: device.as_ref().map(Device::about),
         cage: cage_counts(&cage),
         equal,
         path,

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use drumlin_benches::{
+    device,
     measure::{Table, Timing, thousands, three_digits},
     plot::{Line, Plot},
     scheme::Scheme,
@@ -19,6 +20,8 @@ const NOTES: &str = "\
 * Equal error everywhere: a cap is off by its greatest distance from the limit along the limit's normal, at 5 x 5 places.
   Adaptive gives each feature the least depth at which its own caps are within what classic leaves at worst, looked up;
   measuring comes before and is not in the time.
+* On a device: all points by the stage `refine`; bytes are those of rows read, of points gathered (each as often as a row
+  names it) and of points written. No time where a buffer is larger than a binding of 128 MiB.
 * Along the path: depths by `DepthRule::DEFAULT` (half a pixel, triangles of eight) at 1920 x 1080. Classic gives all
   features the depth the rule asks for where it asks for most.
 * Tiles: the engine's own, of the same elevation model, at half a pixel of vertical error everywhere, the ground behind
@@ -42,6 +45,8 @@ pub(crate) fn text(report: &Report) -> Result<String> {
         three_digits(report.equal.mean_edge_length),
     );
     let _ = writeln!(text, "Equal error everywhere:\n\n{}", equal(report).text());
+    let device = device::line(report.device.as_ref());
+    let _ = writeln!(text, "{device}\n\n{}", executions(report).text());
     let _ = writeln!(text, "Along the path:\n\n{}", path(report)?.text());
     let _ = writeln!(text, "Tiles:\n\n{}", tiles(report).text());
     let _ = writeln!(text, "A step of the camera:\n\n{}", steps(report).text());
@@ -109,6 +114,18 @@ fn equal(report: &Report) -> Table {
         let ratio = row.scheme.one_thread.total() / classic.one_thread.total();
         let cells = names.into_iter().chain(scheme_cells(&row.scheme));
         table.row(cells.chain([three_digits(ratio)]));
+    }
+    table
+}
+
+fn executions(report: &Report) -> Table {
+    let mut table = Table::new(&device::COLUMNS);
+    for row in &report.equal.rows {
+        table.row(device::row(
+            row.name,
+            &row.execution,
+            report.device.as_ref(),
+        ));
     }
     table
 }
