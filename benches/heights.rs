@@ -20,10 +20,10 @@ pub struct Heights {
 }
 
 impl Heights {
-    /// Reads a whole elevation model.
+    /// Reads a whole elevation model; voids take the mean of what lies around them.
     ///
     /// # Errors
-    /// What is wrong with the file; a void in it; fewer than two samples along a side.
+    /// What is wrong with the file; nothing but voids in it; fewer than two samples along a side.
     pub fn read(file: &Path) -> Result<Self> {
         let raster = dem::open(file, &OpenOptions::default())?;
         let header = raster.header();
@@ -48,6 +48,7 @@ impl Heights {
             step[0].abs() * (columns as f64 - 1.0),
             step[1].abs() * (rows as f64 - 1.0),
         ];
+        fill_voids(columns, &mut samples);
         Self::new(columns, samples, size)
     }
 
@@ -97,6 +98,34 @@ impl Heights {
     }
 }
 
+/// Gives every NaN the mean of the smallest square of samples, 2^n a side, that has a number in it.
+fn fill_voids(columns: usize, samples: &mut [f32]) {
+    let is_whole = samples.iter().all(|height| height.is_finite());
+    if is_whole || columns == 0 || samples.len() < 2 {
+        return;
+    }
+    let (rows, half) = (samples.len() / columns, columns.div_ceil(2));
+    let mut sums = vec![(0.0_f64, 0_u32); half * rows.div_ceil(2)];
+    let place = |at: usize| at / columns / 2 * half + at % columns / 2;
+    for (at, &height) in samples
+        .iter()
+        .enumerate()
+        .filter(|(_, height)| height.is_finite())
+    {
+        let (sum, count) = &mut sums[place(at)];
+        *sum += f64::from(height);
+        *count += 1;
+    }
+    let mean = |&(sum, count): &(f64, u32)| (sum / f64::from(count)) as f32;
+    let mut means: Vec<_> = sums.iter().map(mean).collect();
+    fill_voids(half, &mut means);
+    for (at, height) in samples.iter_mut().enumerate() {
+        if !height.is_finite() {
+            *height = means[place(at)];
+        }
+    }
+}
+
 /// Rows read at once.
 const STRIP_ROWS: usize = 512;
 
@@ -118,6 +147,18 @@ mod tests {
         assert_eq!(heights.at([0.0, 0.0]), 0.0);
         assert_eq!(heights.at([1.0, 1.0]), 6.0);
         assert_eq!(heights.at([0.25, 0.5]), 2.5);
+    }
+
+    #[test]
+    fn voids_take_the_mean_around_them() {
+        let mut samples = vec![1.0, f32::NAN, 5.0, 7.0, 3.0, 2.0, f32::NAN, f32::NAN];
+        fill_voids(4, &mut samples);
+        assert_eq!(samples, [1.0, 2.0, 5.0, 7.0, 3.0, 2.0, 6.0, 6.0]);
+        // A square without a number takes that of the next larger one.
+        let mut samples = vec![f32::NAN; 16];
+        samples[15] = 4.0;
+        fill_voids(4, &mut samples);
+        assert_eq!(samples, [4.0; 16]);
     }
 
     #[test]

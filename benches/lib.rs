@@ -8,8 +8,13 @@
     reason = "cages of experiments are numbered in 32 bits by the core"
 )]
 
+pub mod cap_errors;
+pub mod errors;
 pub mod heights;
 pub mod measure;
 pub mod peer;
+pub mod picture;
+pub mod plot;
 pub mod quadtree;
+pub mod scheme;
 pub mod terrain_cage;

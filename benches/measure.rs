@@ -59,33 +59,70 @@ impl Timing {
     }
 }
 
+/// Which time counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Clock {
+    /// The clock on the wall.
+    Wall,
+    /// Seconds of this thread's processor, for work that it does alone: what else the machine does meanwhile does not
+    /// count. On an idle machine the same as the wall's.
+    Thread,
+}
+
+impl Clock {
+    /// Seconds that `work` takes, and what it gives.
+    pub fn time<T>(self, work: impl FnOnce() -> T) -> (f64, T) {
+        match self {
+            Self::Wall => timed(work, Instant::now, |start| start.elapsed()),
+            Self::Thread => timed(work, ThreadTime::now, ThreadTime::elapsed),
+        }
+    }
+}
+
 /// Times `work` a number of times, at least once, after one run that is not counted; also what the last run gave.
 /// What a run gives is dropped outside of its time.
 pub fn median_of<T>(runs: usize, work: impl FnMut() -> T) -> (Timing, T) {
-    repeat(runs, work, Instant::now, |start| start.elapsed())
+    clocked_median_of(Clock::Wall, runs, work)
 }
 
-/// [`median_of`] in seconds of this thread's processor, for work that it does alone: what else the machine does
-/// meanwhile does not count. On an idle machine the same as [`median_of`].
+/// [`median_of`] by [`Clock::Thread`].
 pub fn thread_median_of<T>(runs: usize, work: impl FnMut() -> T) -> (Timing, T) {
-    repeat(runs, work, ThreadTime::now, ThreadTime::elapsed)
+    clocked_median_of(Clock::Thread, runs, work)
 }
 
-fn repeat<T, Clock>(
+/// [`median_of`] by either clock.
+pub fn clocked_median_of<T>(clock: Clock, runs: usize, mut work: impl FnMut() -> T) -> (Timing, T) {
+    prepared_median_of(clock, runs, &mut (), |()| (), |()| work())
+}
+
+/// [`clocked_median_of`] of work that needs its state made ready before every run, outside of the time.
+pub fn prepared_median_of<S, T>(
+    clock: Clock,
     runs: usize,
-    mut work: impl FnMut() -> T,
-    now: fn() -> Clock,
-    since: fn(&Clock) -> Duration,
+    state: &mut S,
+    mut prepare: impl FnMut(&mut S),
+    mut work: impl FnMut(&mut S) -> T,
 ) -> (Timing, T) {
-    let mut last = work();
+    prepare(state);
+    let mut last = work(state);
     let mut seconds = Vec::with_capacity(runs.max(1));
     for _ in 0..runs.max(1) {
-        let start = now();
-        let result = std::hint::black_box(work());
-        seconds.push(since(&start).as_secs_f64());
+        prepare(state);
+        let (time, result) = clock.time(|| work(state));
+        seconds.push(time);
         last = result;
     }
     (Timing::of(seconds), last)
+}
+
+fn timed<T, Start>(
+    work: impl FnOnce() -> T,
+    now: fn() -> Start,
+    since: fn(&Start) -> Duration,
+) -> (f64, T) {
+    let start = now();
+    let result = std::hint::black_box(work());
+    (since(&start).as_secs_f64(), result)
 }
 
 /// Runs `work` with a rayon pool of so many threads.

@@ -101,7 +101,7 @@ pub fn sharpest_edges(cage: &Cage) -> Vec<Crease> {
     sharpest.collect()
 }
 
-fn terrain_cage_of(heights: &Heights, quads: u64, unit_exponent: u8) -> Result<Cage> {
+pub(crate) fn terrain_cage_of(heights: &Heights, quads: u64, unit_exponent: u8) -> Result<Cage> {
     let mut tree = Quadtree::new(unit_exponent);
     let units = f64::from(tree.side());
     tree.refine(quads, |leaf| {

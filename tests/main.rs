@@ -1,6 +1,7 @@
 //! End-to-end tests, one binary.
 
 mod browser;
+mod builds;
 mod cages;
 mod commands;
 mod embed;

@@ -354,6 +354,7 @@ impl HillSource {
         };
         let metadata = Metadata {
             version: Metadata::VERSION,
+            build: None,
             grid,
             crs: Crs::unknown(),
             vertical: VerticalReference::Unknown,

@@ -34,7 +34,7 @@ use self::{
 /// Set-up, update and limit evaluation on one thread.
 #[derive(Parser)]
 struct Arguments {
-    /// Elevation model the cage is made of, without voids.
+    /// Elevation model the cage is made of; voids are filled.
     #[arg(long)]
     dem: PathBuf,
     /// Quads of the cage.

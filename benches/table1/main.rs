@@ -1,35 +1,28 @@
 //! Classic against adaptive refinement at the same worst error, on four cages with the counts of the paper's Table 1.
 //!
 //! ```text
-//! cargo run --release -p drumlin-benches --bin table1 -- [--cages FOLDER] [--json FILE]
+//! cargo run --release -p drumlin-benches --bin table1 -- [--cages FOLDER] [--json FILE] [--pictures FOLDER]
 //! ```
 //!
 //! Based on: Lin, Wang, Sun, *Improved feature-adaptive subdivision for Catmull-Clark surface model* (2018), Table 1.
 
-#![expect(
-    clippy::cast_possible_truncation,
-    reason = "positions of experiments are rounded to f32 on purpose"
-)]
-
-mod errors;
 mod rows;
-mod scheme;
+mod seen;
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
 use clap::Parser;
 use drumlin_benches::{
+    errors::{Errors, blocks_at, depths_within, mean_edge_length},
     measure::{self, Machine, geometric_mean},
+    scheme::{self, Scheme},
     terrain_cage::{CageCounts, cage_counts},
 };
 use drumlin_core::cage::{Cage, CageBudget, read_obj};
 use serde::Serialize;
 
-use self::{
-    errors::{Errors, blocks_at, depths_within, mean_edge_length},
-    scheme::Scheme,
-};
+use crate::seen::Seen;
 
 /// The paper's models; the cages have their counts, not their shape.
 const NAMES: [&str; 4] = ["hippo", "crocodile", "gorilla", "koala"];
@@ -45,7 +38,7 @@ const CHECK_STEPS: u32 = 23;
 #[derive(Parser)]
 struct Arguments {
     /// Folder with table1_hippo.obj, table1_crocodile.obj, table1_gorilla.obj and table1_koala.obj.
-    #[arg(long, default_value = "../shared/reference/catmull-clark/table1")]
+    #[arg(long, default_value = "assets/table1")]
     cages: PathBuf,
     /// Worst error allowed, in mean edge lengths of the cage.
     #[arg(long, default_value_t = 1e-3)]
@@ -56,6 +49,9 @@ struct Arguments {
     /// Writes all figures.
     #[arg(long)]
     json: Option<PathBuf>,
+    /// Writes the pictures that are compared, as PNG.
+    #[arg(long)]
+    pictures: Option<PathBuf>,
 }
 
 /// Everything, as JSON.
@@ -78,6 +74,9 @@ struct Case {
     bound: f64,
     classic: Scheme,
     adaptive: Scheme,
+    /// Greatest distance from the limit of both.
+    worst_errors: [f64; 2],
+    seen: Seen,
 }
 
 impl Case {
@@ -116,15 +115,17 @@ fn case(name: &'static str, arguments: &Arguments) -> Result<Case> {
     let features = errors.by_feature(&blocks_at(&cage, &same())?, depth);
     let own = || depths_within(SHARE * bound, &features, vertices);
     let mut check = Errors::new(&cage, CHECK_STEPS)?;
-    let (same_error, own_error) = (check.worst(&same())?, check.worst(&own())?);
+    let worst_errors = [check.worst(&same())?, check.worst(&own())?];
     let runs = usize::from(arguments.runs);
     Ok(Case {
         name,
         cage: cage_counts(&cage),
         mean_edge_length,
         bound,
-        classic: scheme::measure(&cage, &same, same_error, runs)?,
-        adaptive: scheme::measure(&cage, &own, own_error, runs)?,
+        classic: scheme::measure(&cage, &same, runs)?,
+        adaptive: scheme::measure(&cage, &own, runs)?,
+        worst_errors,
+        seen: Seen::new(name, &cage, arguments.pictures.as_deref())?,
     })
 }
 

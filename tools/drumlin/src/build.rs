@@ -9,27 +9,32 @@ use drumlin_core::{
     dem::{self, DemError, Image, Mosaic, OpenOptions, Raster},
     geo::CrsKind,
     pyramid::{
-        PyramidError, SourceMetadata, VerticalReference,
-        build::{BuildOptions, BuildPlan, BuildReport, Imagery, build, plan},
+        ColorCodec, PyramidError, VerticalReference,
+        build::{
+            BuildOptions, BuildPlan, BuildReport, Imagery, Progress as Step, Stage, build, plan,
+        },
         feature::FeatureInput,
     },
 };
 use drumlin_terminal::{outcome::Outcome, print, size};
 use serde_json::{Value, json};
 
-use crate::{cage, interrupt, progress::Progress, sources};
+use crate::{cage, input_list, interrupt, progress::Progress, sources::Sources};
 
 /// Bytes of decoded strips and tiles kept of all inputs together.
 const CACHE_BYTES: u64 = 64 << 20;
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct Arguments {
     /// GeoTIFF, SRTM .hgt, 16-bit PNG or EXR; where several overlap, the later one wins
-    #[arg(value_name = "INPUT", required = true)]
+    #[arg(value_name = "INPUT", required_unless_present = "input_list")]
     inputs: Vec<PathBuf>,
+    /// A text file that names more inputs, one a line, relative to the file; lines that start with # are left out
+    #[arg(long, value_name = "FILE")]
+    input_list: Option<PathBuf>,
     /// The pyramid to make: a folder, which appears when it is whole
     #[arg(short, long, value_name = "OUT.zarr")]
-    output: PathBuf,
+    pub(crate) output: PathBuf,
     /// Greatest error of the finest level in metres [default: the largest that gives whole metres back exactly; 0.1
     /// for other heights]
     #[arg(long, value_name = "METRES")]
@@ -39,7 +44,7 @@ pub(crate) struct Arguments {
     unit: Option<f64>,
     /// Threads [default: all cores]; the result does not depend on it
     #[arg(short = 'j', long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    jobs: Option<u16>,
+    pub(crate) jobs: Option<u16>,
     /// Memory the build may take, as 512MiB or 4GB; refused beforehand where that is too little; the result does not
     /// depend on it
     #[arg(long, value_name = "BYTES", value_parser = size::parse)]
@@ -54,6 +59,9 @@ pub(crate) struct Arguments {
     /// overlap, the later one wins; where one has alpha, a mask or a value for nothing, what is under it shows
     #[arg(long, value_name = "IMG", num_args = 1..)]
     imagery: Vec<PathBuf>,
+    /// How pictures are stored: without loss, or as JPEG of a quality from 1 to 100
+    #[arg(long, value_name = "zstd|jpeg[:QUALITY]", value_parser = color_codec, default_value = "zstd")]
+    imagery_codec: ColorCodec,
     /// Cages to lay into the finest level: OBJ with tags and a line "# drumlin position X Y Z"
     #[arg(long, value_name = "FILE", num_args = 1..)]
     features: Vec<PathBuf>,
@@ -66,10 +74,10 @@ pub(crate) struct Arguments {
     /// Prints what would be done (tasks, tiles, bytes, time, from three small windows) and builds nothing; the rest of
     /// the input, features and imagery are not tried
     #[arg(long)]
-    dry_run: bool,
+    pub(crate) dry_run: bool,
     /// A summary for programs on standard output
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -81,41 +89,111 @@ enum Vertical {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<Outcome> {
     let cancel = interrupt::flag()?;
+    with_inputs(arguments, &mut Sources::default(), |inputs| {
+        let Inputs {
+            raster,
+            imagery,
+            options,
+        } = inputs;
+        if arguments.dry_run {
+            let plan = plan(raster, imagery, options, &cancel)?;
+            print(&if arguments.json {
+                format!("{:#}\n", serde_json::to_value(&plan)?)
+            } else {
+                plan_lines(arguments, &plan)
+            })?;
+            return Ok(());
+        }
+        let progress = Progress::new();
+        let tell = |step: Step| {
+            if step.stage == Stage::StartOver {
+                progress.say(&format!(
+                    "{}: an earlier run left a build of other inputs or options, or by another version; starting over",
+                    arguments.output.display()
+                ));
+            }
+            progress.tell(step.stage.label(), step.done, step.total);
+        };
+        let report = build(raster, imagery, options, &tell, &cancel)?;
+        drop(progress);
+        print_report(arguments, &report)
+    })?;
+    Ok(Outcome::Done)
+}
+
+/// What a build is made of.
+pub(crate) struct Inputs<'a> {
+    pub(crate) raster: &'a dyn Raster,
+    pub(crate) imagery: Option<&'a Imagery<'a>>,
+    pub(crate) options: &'a BuildOptions,
+}
+
+/// Opens all that a build is made of.
+pub(crate) fn with_inputs<T>(
+    arguments: &Arguments,
+    sources: &mut Sources,
+    act: impl FnOnce(Inputs<'_>) -> Result<T>,
+) -> Result<T> {
+    let mut arguments = arguments.clone();
+    if let Some(list) = &arguments.input_list {
+        arguments.inputs.extend(input_list::read(list)?);
+    }
+    let arguments = &arguments;
+    sources.look(&arguments.inputs)?;
+    sources.look(&arguments.imagery)?;
     let raster = open(arguments)?;
     let images = arguments.imagery.iter();
     let images: Vec<Image> = images
         .map(|file| open_imagery(arguments, file, &*raster))
         .collect::<Result<_>>()?;
-    let imagery = (!images.is_empty()).then_some(Imagery {
-        images: &images,
-        sources: describe(&arguments.imagery)?,
-    });
-    let options = options(arguments)?;
-    if arguments.dry_run {
-        let plan = plan(&*raster, imagery.as_ref(), &options, &cancel)?;
-        print(&if arguments.json {
-            format!("{:#}\n", serde_json::to_value(&plan)?)
-        } else {
-            plan_lines(arguments, &plan)
-        })?;
-        return Ok(Outcome::Done);
-    }
-    let progress = Progress::new();
-    let tell = |step: drumlin_core::pyramid::build::Progress| {
-        progress.tell(step.stage.label(), step.done, step.total);
-    };
-    let report = build(&*raster, imagery.as_ref(), &options, &tell, &cancel)?;
-    drop(progress);
-    let text = if arguments.json {
-        format!("{:#}\n", json(arguments, &report)?)
+    let imagery = if images.is_empty() {
+        None
     } else {
-        lines(arguments, &report)
+        Some(Imagery {
+            images: &images,
+            codec: arguments.imagery_codec,
+            sources: sources.describe(&arguments.imagery)?,
+        })
     };
-    print(&text)?;
-    Ok(Outcome::Done)
+    act(Inputs {
+        raster: &*raster,
+        imagery: imagery.as_ref(),
+        options: &options(arguments, sources)?,
+    })
 }
 
-fn options(arguments: &Arguments) -> Result<BuildOptions> {
+/// A codec as it is typed.
+fn color_codec(text: &str) -> Result<ColorCodec, String> {
+    let quality = match text.split_once(':') {
+        None if text == "zstd" => return Ok(ColorCodec::Zstd),
+        None if text == "jpeg" => ColorCodec::QUALITY,
+        Some(("jpeg", quality)) => quality.parse().unwrap_or(0),
+        _ => return Err("zstd, jpeg and jpeg:QUALITY are known".into()),
+    };
+    if (1..=100).contains(&quality) {
+        Ok(ColorCodec::Jpeg { quality })
+    } else {
+        Err("a quality is a number from 1 to 100".into())
+    }
+}
+
+/// Says what was made, or that it was there.
+pub(crate) fn print_report(arguments: &Arguments, report: &BuildReport) -> Result<()> {
+    if report.unchanged {
+        eprintln!(
+            "drumlin: {}: is there already, of the same inputs and options; nothing was done",
+            arguments.output.display()
+        );
+    }
+    print(&if arguments.json {
+        format!("{:#}\n", json(arguments, report)?)
+    } else {
+        lines(arguments, report)
+    })?;
+    Ok(())
+}
+
+fn options(arguments: &Arguments, sources: &mut Sources) -> Result<BuildOptions> {
     Ok(BuildOptions {
         output: arguments.output.clone(),
         overwrite: arguments.overwrite,
@@ -133,12 +211,9 @@ fn options(arguments: &Arguments) -> Result<BuildOptions> {
             .iter()
             .map(|file| feature(file))
             .collect::<Result<_>>()?,
-        sources: describe(&arguments.inputs)?,
+        sources: sources.describe(&arguments.inputs)?,
+        inputs: sources.stamps(),
     })
-}
-
-fn describe(files: &[PathBuf]) -> Result<Vec<SourceMetadata>> {
-    files.iter().map(|file| sources::describe(file)).collect()
 }
 
 /// Reads a cage and where it stands.
@@ -259,7 +334,17 @@ fn lines(arguments: &Arguments, report: &BuildReport) -> String {
         );
     }
     if report.color_levels > 0 {
-        text += &format!(", {} of imagery", size::display(report.color_bytes));
+        text += &format!(
+            ", {} of imagery ({})",
+            size::display(report.color_bytes),
+            arguments.imagery_codec
+        );
+    }
+    if report.unchanged {
+        return text + "\n";
+    }
+    if report.kept_tasks > 0 {
+        text += &format!("\n  {} tasks kept of an earlier run", report.kept_tasks);
     }
     let samples = f64::from(rows) * f64::from(columns) / report.seconds.max(1e-9) / 1e6;
     text + &format!(

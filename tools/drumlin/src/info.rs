@@ -51,7 +51,7 @@ impl Bytes {
             levels: levels
                 .map(|level| count(&format!("tile/{level}")))
                 .collect::<Result<_, _>>()?,
-            color: count("color")?,
+            color: count("color")? + count("alpha")?,
             all: count("")?,
         })
     }
@@ -126,8 +126,8 @@ fn lines(metadata: &Metadata, bytes: &Bytes) -> Result<String> {
         let bytes = size::display(bytes.color);
         writeln!(
             text,
-            "  imagery   {} levels of {} texels a tile, {bytes}",
-            color.levels, color.texels
+            "  imagery   {} levels of {} texels a tile, {bytes}, {}",
+            color.levels, color.texels, color.codec
         )?;
     }
     let color = metadata.color.iter().flat_map(|color| &color.sources);

@@ -12,8 +12,10 @@ mod extract;
 mod feature;
 mod height;
 mod info;
+mod input_list;
 mod interrupt;
 mod pack;
+mod plan;
 mod progress;
 mod serve;
 mod sources;
@@ -42,6 +44,15 @@ enum Verb {
     /// Builds a pyramid from elevation models
     #[command(after_help = EXIT_CODES)]
     Build(build::Arguments),
+    /// Writes a build down as tasks, for as many processes and machines as see its files
+    #[command(after_help = EXIT_CODES)]
+    Plan(plan::PlanArguments),
+    /// Does one task of a plan, where it is not done; the passes before it are
+    #[command(after_help = EXIT_CODES)]
+    Task(plan::TaskArguments),
+    /// Publishes the pyramid of a plan whose tasks are done
+    #[command(after_help = EXIT_CODES)]
+    Finish(plan::FinishArguments),
     /// Says what a pyramid holds
     #[command(after_help = EXIT_CODES)]
     Info(info::Arguments),
@@ -93,6 +104,9 @@ fn main() -> ExitCode {
     };
     let outcome = match arguments.verb {
         Verb::Build(arguments) => build::run(&arguments),
+        Verb::Plan(arguments) => plan::run(&arguments),
+        Verb::Task(arguments) => plan::run_one(&arguments),
+        Verb::Finish(arguments) => plan::run_finish(&arguments),
         Verb::Info(arguments) => info::run(&arguments),
         Verb::Validate(arguments) => validate::run(&arguments),
         Verb::Height(arguments) => height::run(&arguments),

@@ -26,6 +26,11 @@ impl Progress {
         }
     }
 
+    /// Says a line, above the bar where there is one.
+    pub(crate) fn say(&self, line: &str) {
+        self.bar.suspend(|| eprintln!("drumlin: {line}"));
+    }
+
     /// So much of a stage is done.
     pub(crate) fn tell(&self, stage: &'static str, done: u64, total: u64) {
         let mut current = self

@@ -38,7 +38,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), PyramidError> {
     write_whole(&target(path)?, bytes)
 }
 
-/// As [`write`], for large files that are written in pieces and whose places are gone back to. One that is there is
+/// As [`write()`], for large files that are written in pieces and whose places are gone back to. One that is there is
 /// replaced only where `overwrite` says so.
 ///
 /// # Errors

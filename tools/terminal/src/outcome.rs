@@ -58,7 +58,7 @@ impl Outcome {
         match error {
             PyramidError::Io { .. } | PyramidError::Dem(DemError::Io { .. }) => Self::Io,
             PyramidError::Refused(_) => Self::Usage,
-            PyramidError::Interrupted => Self::Interrupted,
+            PyramidError::Interrupted | PyramidError::Changed(_) => Self::Interrupted,
             _ => Self::InvalidData,
         }
     }

@@ -32,7 +32,7 @@ pub(crate) fn adapter(profile: &str) -> Result<()> {
     Ok(())
 }
 
-/// A Python with `zarr` and `numpy`, in an environment of its own under the target folder.
+/// A Python with `zarr`, `numpy` and Dask, in an environment of its own under the target folder.
 pub(crate) fn python() -> Result<PathBuf> {
     let folder = target().join("venv");
     let python = folder.join(if cfg!(windows) {
@@ -43,7 +43,10 @@ pub(crate) fn python() -> Result<PathBuf> {
     let ready = || {
         succeeds(&mut command(
             &python,
-            &["-c", "import numpy, zarr; assert zarr.__version__ >= '3'"],
+            &[
+                "-c",
+                "import distributed, numpy, zarr; assert zarr.__version__ >= '3'",
+            ],
         ))
     };
     if ready() {
@@ -67,14 +70,15 @@ pub(crate) fn python() -> Result<PathBuf> {
         "--disable-pip-version-check",
         "numpy",
         "zarr>=3",
+        "distributed",
     ];
     run(
-        "installing zarr for Python",
+        "installing zarr and Dask for Python",
         &mut command(&python, &arguments),
     )?;
     if !ready() {
         bail!(
-            "{}: zarr 3 does not load; it needs Python 3.11 or later",
+            "{}: zarr 3 or Dask does not load; zarr needs Python 3.11 or later",
             python.display()
         );
     }

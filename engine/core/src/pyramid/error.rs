@@ -43,6 +43,9 @@ pub enum PyramidError {
     /// What was asked for cannot be done.
     #[error("{0}")]
     Refused(String),
+    /// An input is not what it was when the build began.
+    #[error("{path}: changed while it was read; a second run builds from what it is now", path = .0.display())]
+    Changed(PathBuf),
     /// The caller asked to stop.
     #[error("interrupted; a second run completes the build")]
     Interrupted,

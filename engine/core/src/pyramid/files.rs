@@ -4,6 +4,8 @@ use std::{
     fs::{self, File},
     io::{ErrorKind, Read, Write},
     path::{Path, PathBuf},
+    sync::atomic::{AtomicU64, Ordering},
+    time::SystemTime,
 };
 
 use super::PyramidError;
@@ -13,6 +15,15 @@ pub(super) fn sibling(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(suffix);
     path.with_file_name(name)
+}
+
+/// A name that no other process has, nor this one again.
+pub(super) fn unique() -> String {
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    let nanos = since.map_or(0, |since| since.as_nanos());
+    let count = COUNT.fetch_add(1, Ordering::Relaxed);
+    format!("{:x}-{nanos:x}-{count:x}", std::process::id())
 }
 
 /// Writes a file so that it is whole or not there, on the disk and not only in the cache.
@@ -34,26 +45,36 @@ pub fn write_whole_with(
     path: &Path,
     write: impl FnOnce(&mut File) -> Result<(), PyramidError>,
 ) -> Result<(), PyramidError> {
-    let partial = sibling(path, ".partial");
+    write_whole_as(path, &sibling(path, ".partial"), write)
+}
+
+/// As [`write_whole_with`], under another name on the same disk until it is whole.
+pub(super) fn write_whole_as(
+    path: &Path,
+    partial: &Path,
+    write: impl FnOnce(&mut File) -> Result<(), PyramidError>,
+) -> Result<(), PyramidError> {
     let folder = path.parent().unwrap_or(Path::new("."));
-    fs::create_dir_all(folder).map_err(PyramidError::io("creating", folder))?;
+    for folder in [Some(folder), partial.parent()].into_iter().flatten() {
+        fs::create_dir_all(folder).map_err(PyramidError::io("creating", folder))?;
+    }
     let written = File::options()
         .read(true)
         .write(true)
         .create(true)
         .truncate(true)
-        .open(&partial)
-        .map_err(PyramidError::io("creating", &partial))
+        .open(partial)
+        .map_err(PyramidError::io("creating", partial))
         .and_then(|mut file| {
             write(&mut file)?;
             file.sync_all().map_err(PyramidError::io("flushing", path))
         });
     if let Err(error) = written {
         // What is left of it is in the way of nothing; the first error is the one to tell.
-        let _ = fs::remove_file(&partial);
+        let _ = fs::remove_file(partial);
         return Err(error);
     }
-    fs::rename(&partial, path).map_err(PyramidError::io("renaming", &partial))?;
+    fs::rename(partial, path).map_err(PyramidError::io("renaming", partial))?;
     sync_folder(folder)
 }
 

@@ -46,6 +46,39 @@ pub struct Level {
     pub voids: bool,
 }
 
+/// How colour tiles are stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ColorCodec {
+    /// As they are, RGBA compressed by zstd.
+    #[default]
+    Zstd,
+    /// RGB as JPEG, and alpha compressed by zstd.
+    Jpeg {
+        /// 1 to 100.
+        quality: u8,
+    },
+}
+
+impl ColorCodec {
+    /// JPEG's quality where none is given.
+    pub const QUALITY: u8 = 85;
+
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "what serde calls")]
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl std::fmt::Display for ColorCodec {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Zstd => f.write_str("lossless, zstd"),
+            Self::Jpeg { quality } => write!(f, "JPEG of quality {quality}"),
+        }
+    }
+}
+
 /// The imagery of a pyramid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ColorMetadata {
@@ -53,8 +86,22 @@ pub struct ColorMetadata {
     pub levels: u8,
     /// Texels a side of a colour tile; the border texels lie on the tile's border and are shared with neighbours.
     pub texels: u32,
+    /// How tiles are stored.
+    #[serde(default, skip_serializing_if = "ColorCodec::is_default")]
+    pub codec: ColorCodec,
     /// The imagery's file names.
     pub sources: Vec<SourceMetadata>,
+}
+
+/// What a build of named sources made, so that the same build again has nothing to do.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BuildMetadata {
+    /// BLAKE3 of all that decides the bytes (inputs, options, builder), in hexadecimal.
+    pub key: String,
+    /// Finest samples that are void.
+    pub void_samples: u64,
+    /// The root tile's true error in metres.
+    pub root_error: f64,
 }
 
 /// What a pyramid says of itself.
@@ -83,6 +130,9 @@ pub struct Metadata {
     pub features: Option<FeatureMetadata>,
     /// What it was built from, in the order given.
     pub sources: Vec<SourceMetadata>,
+    /// Its build, where it was built of named sources.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub build: Option<BuildMetadata>,
 }
 
 impl Metadata {

@@ -9,6 +9,7 @@ mod export;
 pub mod feature;
 mod files;
 mod heights;
+mod jpeg;
 pub(crate) mod light;
 mod manifest;
 mod metadata;
@@ -35,7 +36,9 @@ pub use export::export_geotiff;
 pub use feature::{FeatureGroup, FeatureMetadata};
 pub use files::{write_whole, write_whole_with};
 pub use heights::LevelHeights;
-pub use metadata::{ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference};
+pub use metadata::{
+    BuildMetadata, ColorCodec, ColorMetadata, Level, Metadata, SourceMetadata, VerticalReference,
+};
 pub use pack::{pack, unpack};
 pub use patch_code::{HALF_OCTAVES, NEVER, patch_error, patch_nibble};
 pub use reader::Pyramid;

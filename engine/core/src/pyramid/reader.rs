@@ -12,9 +12,9 @@ use std::{
 use lru::LruCache;
 
 use super::{
-    COLOR_TEXELS, FeatureGroup, Metadata, PyramidError, Record, RecordLayout, Store, StoreError,
-    Tile, feature, open_store,
-    shard::{SHARD_TILES, ShardIndex, decode_chunk, shard_shape},
+    COLOR_TEXELS, ColorCodec, FeatureGroup, Metadata, PyramidError, Record, RecordLayout, Store,
+    StoreError, Tile, feature, open_store,
+    shard::{SHARD_TILES, ShardIndex, decode_chunk, decode_jpeg, shard_shape},
     surface::{self, CONTROL_LIMIT},
     zarr,
 };
@@ -30,6 +30,7 @@ const RESIDUAL_LIMIT: u64 = 1 << 28;
 pub(super) enum Array {
     Tile,
     Color,
+    Alpha,
     Feature,
 }
 
@@ -41,6 +42,7 @@ impl Array {
             Self::Tile => zarr::shard_key(&format!("tile/{}", tile.level), shard, 1),
             Self::Feature => zarr::shard_key(&format!("feature/{}", tile.level), shard, 1),
             Self::Color => zarr::shard_key(&format!("color/{}", tile.level), shard, 3),
+            Self::Alpha => zarr::shard_key(&format!("alpha/{}", tile.level), shard, 2),
         }
     }
 }
@@ -185,12 +187,29 @@ impl Pyramid {
     ///
     /// Where the imagery is missing, cut short or damaged.
     pub fn read_color(&self, tile: TileId) -> Result<Option<Vec<u8>>, PyramidError> {
-        let levels = self.metadata.color.as_ref().map_or(0, |color| color.levels);
-        if tile.level >= levels || !self.has(tile) {
+        let Some(color) = &self.metadata.color else {
+            return Ok(None);
+        };
+        if tile.level >= color.levels || !self.has(tile) {
             return Ok(None);
         }
-        let bytes = COLOR_TEXELS * COLOR_TEXELS * 4;
-        self.read_chunk(Array::Color, tile, bytes)
+        let count = COLOR_TEXELS * COLOR_TEXELS;
+        if color.codec == ColorCodec::Zstd {
+            return self.read_chunk(Array::Color, tile, 4 * count);
+        }
+        let Some(mut texels) = self.read_chunk_by(Array::Color, tile, decode_jpeg)? else {
+            return Ok(None);
+        };
+        if let Some(alpha) = self.read_chunk(Array::Alpha, tile, count)? {
+            for (texel, alpha) in texels.as_chunks_mut::<4>().0.iter_mut().zip(alpha) {
+                *texel = if alpha == 0 {
+                    [0; 4]
+                } else {
+                    [texel[0], texel[1], texel[2], alpha]
+                };
+            }
+        }
+        Ok(Some(texels))
     }
 
     /// The features laid into a tile: those its record names, with the cages of those whose home it is. None where the
@@ -257,6 +276,16 @@ impl Pyramid {
         tile: TileId,
         byte_count: usize,
     ) -> Result<Option<Vec<u8>>, PyramidError> {
+        self.read_chunk_by(array, tile, |chunk| decode_chunk(chunk, byte_count))
+    }
+
+    /// The same, decoded by `decode`.
+    fn read_chunk_by(
+        &self,
+        array: Array,
+        tile: TileId,
+        decode: impl FnOnce(&[u8]) -> Result<Vec<u8>, String>,
+    ) -> Result<Option<Vec<u8>>, PyramidError> {
         let key = array.shard_key(tile);
         let index = self.index(array, tile, &key)?;
         let Some(range) = index.chunk([tile.row % SHARD_TILES, tile.column % SHARD_TILES]) else {
@@ -274,7 +303,7 @@ impl Pyramid {
                 chunk.len()
             )));
         }
-        decode_chunk(&chunk, byte_count).map(Some).map_err(wrap)
+        decode(&chunk).map(Some).map_err(wrap)
     }
 
     /// The index of a tile's shard, from memory where it is there.

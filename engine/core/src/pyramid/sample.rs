@@ -3,8 +3,8 @@
 use std::{collections::HashMap, path::Path};
 
 use super::{
-    COLOR_TEXELS, ColorMetadata, Level, Metadata, PyramidWriter, RecordLayout, RecordParts,
-    SourceMetadata, Summary, VOID_BYTES, VerticalReference, shard_count, surface,
+    COLOR_TEXELS, ColorCodec, ColorMetadata, Level, Metadata, PyramidWriter, RecordLayout,
+    RecordParts, SourceMetadata, Summary, VOID_BYTES, VerticalReference, shard_count, surface,
 };
 use crate::geo::{
     CAGE_CONTROL_COUNT, CAGE_CONTROLS, Crs, Grid, PATCH_COUNT, QUAD_SAMPLES, TILE_CELLS,
@@ -49,6 +49,7 @@ pub(super) fn metadata(rows: u32, columns: u32) -> Metadata {
     };
     Metadata {
         version: Metadata::VERSION,
+        build: None,
         grid,
         crs: Crs {
             code: Some("EPSG:32610".into()),
@@ -63,6 +64,7 @@ pub(super) fn metadata(rows: u32, columns: u32) -> Metadata {
         color: Some(ColorMetadata {
             levels: 1,
             texels: 256,
+            codec: ColorCodec::Zstd,
             sources: vec![source.clone()],
         }),
         sources: vec![source],
@@ -76,6 +78,23 @@ pub(crate) fn write(path: &Path, rows: u32, columns: u32) -> Metadata {
     let shards = write_with(&writer, rows, columns);
     writer.publish(&metadata, &shards).unwrap();
     metadata
+}
+
+/// Writes a pyramid of one tile whose imagery is stored as JPEG.
+pub(super) fn write_with_jpeg(path: &Path, texels: &[u8]) {
+    let mut metadata = metadata(100, 100);
+    let codec = ColorCodec::Jpeg { quality: 90 };
+    metadata.color.as_mut().unwrap().codec = codec;
+    let writer = PyramidWriter::create(path, false).unwrap();
+    let mut shards = write_with(&writer, 100, 100);
+    shards.retain(|shard| !shard.key.starts_with("color"));
+    let contents = |_| Ok(Some(texels.to_vec()));
+    shards.extend(
+        writer
+            .write_color_shard(codec, 0, [1, 1], [0, 0], &contents)
+            .unwrap(),
+    );
+    writer.publish(&metadata, &shards).unwrap();
 }
 
 /// Writes the shards of the small pyramid.
@@ -98,9 +117,9 @@ pub(super) fn write_with(writer: &PyramidWriter, rows: u32, columns: u32) -> Vec
         }
     }
     let texels = |tile: TileId| Ok(Some(vec![tile.level + 9; COLOR_TEXELS * COLOR_TEXELS * 4]));
-    shards.push(
+    shards.extend(
         writer
-            .write_color_shard(0, [1, 1], [0, 0], &texels)
+            .write_color_shard(ColorCodec::Zstd, 0, [1, 1], [0, 0], &texels)
             .unwrap(),
     );
     shards

@@ -14,6 +14,8 @@ use std::{cell::RefCell, io::Write, ops::Range};
 
 use zstd::zstd_safe::{CParameter, Strategy};
 
+use super::jpeg;
+
 /// Tiles a side of a full shard.
 pub const SHARD_TILES: u32 = 32;
 
@@ -198,6 +200,26 @@ pub(super) fn encode_image(bytes: &[u8]) -> std::io::Result<Vec<u8>> {
     let mut chunk = zstd::bulk::compress(bytes, IMAGE_ZSTD_LEVEL)?;
     append_crc(&mut chunk);
     Ok(chunk)
+}
+
+/// Compresses the texels of a tile as JPEG and adds the checksum.
+///
+/// # Errors
+///
+/// What the encoder says.
+pub(super) fn encode_jpeg(texels: &[u8], quality: u8) -> std::io::Result<Vec<u8>> {
+    let mut chunk = jpeg::encode(texels, quality).map_err(std::io::Error::other)?;
+    append_crc(&mut chunk);
+    Ok(chunk)
+}
+
+/// Checks a chunk and decodes its JPEG.
+///
+/// # Errors
+///
+/// Where the checksum or the JPEG is wrong: what, in words.
+pub(super) fn decode_jpeg(chunk: &[u8]) -> Result<Vec<u8>, String> {
+    jpeg::decode(check_crc(chunk, "the chunk")?)
 }
 
 /// Checks and inflates a chunk of `byte_count` bytes; never more than that are made.

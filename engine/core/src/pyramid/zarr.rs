@@ -5,7 +5,10 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-use super::{COLOR_TEXELS, FeatureMetadata, Metadata, RecordLayout, shard::shard_shape};
+use super::{
+    COLOR_TEXELS, ColorCodec, ColorMetadata, FeatureMetadata, Metadata, RecordLayout,
+    shard::shard_shape,
+};
 
 /// What a root's attributes say in `profile`.
 const PROFILE: &str = "drumlin";
@@ -53,11 +56,7 @@ pub(super) fn nodes(metadata: &Metadata) -> Vec<(String, Vec<u8>)> {
         nodes.push((format!("feature/{}", features.level), array));
     }
     if let Some(color) = &metadata.color {
-        nodes.push(("color".into(), group_json()));
-        nodes.extend((0..color.levels).map(|level| {
-            let array = color_array_json(grid.tiles(level));
-            (format!("color/{level}"), array)
-        }));
+        nodes.extend(color_nodes(metadata, color));
     }
     let file = |(name, text)| (format!("{name}/{NODE}"), text);
     nodes.into_iter().map(file).collect()
@@ -70,19 +69,70 @@ fn group_json() -> Vec<u8> {
 
 /// The `zarr.json` of a level's records: `[rows, columns, bytes]`, one record a chunk.
 fn tile_array_json(tiles: [u32; 2], layout: &RecordLayout) -> Vec<u8> {
-    array_json(tiles, &[layout.byte_count()], &["row", "column", "byte"])
+    let names = ["row", "column", "byte"];
+    array_json(tiles, &[layout.byte_count()], &names, 0, &zstd_codecs())
 }
 
-/// The `zarr.json` of a level's imagery: `[rows, columns, 256, 256, 4]`, one tile a chunk.
-fn color_array_json(tiles: [u32; 2]) -> Vec<u8> {
-    let names = ["row", "column", "texel_row", "texel_column", "rgba"];
-    array_json(tiles, &[COLOR_TEXELS, COLOR_TEXELS, 4], &names)
+/// All nodes of the imagery: names and texts.
+fn color_nodes(metadata: &Metadata, color: &ColorMetadata) -> Vec<(String, Vec<u8>)> {
+    let tiles = |level| metadata.grid.tiles(level);
+    let mut nodes = vec![("color".into(), group_json())];
+    nodes.extend((0..color.levels).map(|level| {
+        let text = color_array_json(tiles(level), color.codec);
+        (format!("color/{level}"), text)
+    }));
+    if color.codec != ColorCodec::Zstd {
+        nodes.push(("alpha".into(), group_json()));
+        nodes.extend(
+            (0..color.levels)
+                .map(|level| (format!("alpha/{level}"), alpha_array_json(tiles(level)))),
+        );
+    }
+    nodes
+}
+
+/// The `zarr.json` of a level's imagery: `[rows, columns, 256, 256, 4 or 3]`, one tile a chunk.
+fn color_array_json(tiles: [u32; 2], codec: ColorCodec) -> Vec<u8> {
+    let (name, channels, codecs) = match codec {
+        ColorCodec::Zstd => ("rgba", 4, zstd_codecs()),
+        ColorCodec::Jpeg { quality } => {
+            let jpeg = json!({"name": "imagecodecs_jpeg", "configuration": {"level": quality}});
+            ("rgb", 3, json!([jpeg, {"name": "crc32c"}]))
+        }
+    };
+    let names = ["row", "column", "texel_row", "texel_column", name];
+    array_json(
+        tiles,
+        &[COLOR_TEXELS, COLOR_TEXELS, channels],
+        &names,
+        0,
+        &codecs,
+    )
+}
+
+/// The `zarr.json` of a level's alpha, where imagery is stored without: `[rows, columns, 256, 256]`, one tile a chunk,
+/// opaque where there is none.
+fn alpha_array_json(tiles: [u32; 2]) -> Vec<u8> {
+    let names = ["row", "column", "texel_row", "texel_column"];
+    array_json(
+        tiles,
+        &[COLOR_TEXELS, COLOR_TEXELS],
+        &names,
+        u8::MAX,
+        &zstd_codecs(),
+    )
 }
 
 /// The `zarr.json` of the features' records: `[rows, columns, bytes]`, one record a chunk.
 fn feature_array_json(tiles: [u32; 2], features: &FeatureMetadata) -> Vec<u8> {
     let bytes = features.record_bytes as usize;
-    array_json(tiles, &[bytes], &["row", "column", "byte"])
+    array_json(
+        tiles,
+        &[bytes],
+        &["row", "column", "byte"],
+        0,
+        &zstd_codecs(),
+    )
 }
 
 /// The file of a shard of `array`, as `tile/5`; `inner_dimensions` are those inside a chunk.
@@ -95,8 +145,23 @@ pub(super) fn shard_key(array: &str, shard: [u32; 2], inner_dimensions: usize) -
     )
 }
 
+/// Bytes as they are, compressed.
+fn zstd_codecs() -> Value {
+    json!([
+        {"name": "bytes"},
+        {"name": "zstd", "configuration": {"level": super::shard::ZSTD_LEVEL, "checksum": false}},
+        {"name": "crc32c"},
+    ])
+}
+
 /// An array of bytes in shards of at most 32 × 32 chunks.
-fn array_json(tiles: [u32; 2], inner: &[usize], names: &[&str]) -> Vec<u8> {
+fn array_json(
+    tiles: [u32; 2],
+    inner: &[usize],
+    names: &[&str],
+    fill: u8,
+    codecs: &Value,
+) -> Vec<u8> {
     let shape = |outer: [u32; 2]| -> Vec<usize> {
         outer
             .iter()
@@ -111,14 +176,10 @@ fn array_json(tiles: [u32; 2], inner: &[usize], names: &[&str]) -> Vec<u8> {
         "data_type": "uint8",
         "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": shape(shard_shape(tiles))}},
         "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
-        "fill_value": 0,
+        "fill_value": fill,
         "codecs": [{"name": "sharding_indexed", "configuration": {
             "chunk_shape": shape([1, 1]),
-            "codecs": [
-                {"name": "bytes"},
-                {"name": "zstd", "configuration": {"level": super::shard::ZSTD_LEVEL, "checksum": false}},
-                {"name": "crc32c"},
-            ],
+            "codecs": codecs,
             "index_codecs": [{"name": "bytes", "configuration": {"endian": "little"}}, {"name": "crc32c"}],
             "index_location": "start",
         }}],
@@ -216,6 +277,12 @@ pub(super) fn check(metadata: &Metadata) -> Result<(), String> {
             "colour tiles of {} texels; this version has {COLOR_TEXELS}",
             color.texels
         )),
+        Some(ColorMetadata {
+            codec: ColorCodec::Jpeg { quality },
+            ..
+        }) if !(1..=100).contains(quality) => {
+            Err(format!("a JPEG quality of {quality}; 1 to 100 are known"))
+        }
         Some(color) if color.levels == 0 || color.levels > grid.level_count() => Err(format!(
             "{} colour levels of {}",
             color.levels,

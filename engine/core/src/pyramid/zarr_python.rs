@@ -80,6 +80,61 @@ fn write_heights(pyramid: &Path, to: &Path) {
     fs::write(to, bytes).unwrap();
 }
 
+/// What `FORMAT.md` says of imagery as JPEG, where its codec is at hand.
+const COMPARE_JPEG: &str = r#"
+import pathlib, sys
+import numpy as np, zarr
+try:
+    import imagecodecs.zarr
+except ImportError:
+    print("no imagecodecs-zarr")
+    sys.exit()
+folder = pathlib.Path(sys.argv[1])
+root = zarr.open_group(folder / "out.zarr", mode="r")
+want = np.fromfile(folder / "texels", "u1").reshape(256, 256, 4)
+color, alpha = root["color/0"], root["alpha/0"]
+assert color.shape == (1, 1, 256, 256, 3) and alpha.shape == (1, 1, 256, 256)
+assert np.array_equal(alpha[0, 0], want[..., 3])
+seen = want[..., 3] > 0
+away = np.abs(color[0, 0].astype(int) - want[..., :3])[seen]
+# Decoders round differently; on the border we show what the border's own segment says.
+assert np.median(away) <= 1 and away.mean() < 3, away.mean()
+print("equal")
+"#;
+
+#[test]
+fn zarr_python_reads_imagery_of_jpeg() {
+    if !has_zarr() {
+        println!("skipped: no zarr-python 3 here");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let pyramid = folder.path().join("out.zarr");
+    let texels: Vec<u8> = (0..256 * 256_u32)
+        .flat_map(|at| {
+            let [row, column] = [at / 256, at % 256].map(|place| place.to_le_bytes()[0]);
+            [row, column, 90, if row > 200 { 0 } else { 255 }]
+        })
+        .collect();
+    sample::write_with_jpeg(&pyramid, &texels);
+    let read = Pyramid::open(&pyramid)
+        .unwrap()
+        .read_color(crate::geo::TileId::ROOT);
+    fs::write(folder.path().join("texels"), read.unwrap().unwrap()).unwrap();
+    let script = folder.path().join("compare.py");
+    fs::write(&script, COMPARE_JPEG).unwrap();
+    let output = Command::new(python())
+        .arg(&script)
+        .arg(folder.path())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    let printed = String::from_utf8_lossy(&output.stdout);
+    println!("{printed}");
+    let fine = ["equal\n", "no imagecodecs-zarr\n"].contains(&&*printed);
+    assert!(output.status.success() && fine, "{said}");
+}
+
 #[test]
 fn zarr_python_reads_the_heights_we_read() {
     if !has_zarr() {

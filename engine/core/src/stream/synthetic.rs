@@ -53,6 +53,7 @@ impl Synthetic {
         };
         let metadata = Metadata {
             version: Metadata::VERSION,
+            build: None,
             grid,
             crs: Crs::unknown(),
             vertical: VerticalReference::Unknown,
@@ -78,6 +79,7 @@ impl Synthetic {
 
     pub(crate) fn with_imagery(mut self, levels: u8) -> Self {
         self.metadata.color = Some(ColorMetadata {
+            codec: crate::pyramid::ColorCodec::Zstd,
             levels,
             texels: 256,
             sources: Vec::new(),

@@ -122,6 +122,21 @@ impl Blocks {
     }
 }
 
+impl Area {
+    /// The area's blocks of `side` rows and columns.
+    pub(super) fn blocks(&self, side: usize) -> Vec<Self> {
+        let blocks = Blocks::new(self.size(), side);
+        let shift = |range: Range<i64>, first: i64| range.start + first..range.end + first;
+        (0..blocks.count())
+            .map(|index| blocks.area(index))
+            .map(|Self { rows, columns }| Self {
+                rows: shift(rows, self.rows.start),
+                columns: shift(columns, self.columns.start),
+            })
+            .collect()
+    }
+}
+
 /// Planes have fewer than 2⁶³ rows.
 pub(super) fn to_signed(place: usize) -> i64 {
     i64::try_from(place).unwrap_or(i64::MAX)
@@ -150,6 +165,17 @@ mod tests {
                 }
             }
             assert!(covered.iter().all(|count| *count == 1));
+        }
+    }
+
+    #[test]
+    fn blocks_of_blocks_are_blocks() {
+        for size in [[129, 257], [300, 256], [513, 1]] {
+            let [fine, coarse] = [64, 128].map(|side| Blocks::new(size, side));
+            let coarse = (0..coarse.count()).flat_map(|index| coarse.area(index).blocks(64));
+            let coarse: Vec<Area> = coarse.collect();
+            assert_eq!(coarse.len(), fine.count());
+            assert!((0..fine.count()).all(|index| coarse.contains(&fine.area(index))));
         }
     }
 

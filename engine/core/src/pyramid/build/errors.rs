@@ -6,13 +6,17 @@
 
 use std::path::Path;
 
-use super::area::Area;
+use serde::{Deserialize, Serialize};
+
+use super::area::{Area, Blocks};
+use super::journal::Made;
 use super::levels::Levels;
 use super::measure::{Drawn, Finest, PatchErrors};
-use super::options::{Stage, Watch};
-use super::passes::in_order;
+use super::options::Stage;
+use super::planes::TASK_SIDE;
 use super::samples::Samples;
-use super::scratch::Plane;
+use super::scratch::{Check, Plane, Written};
+use super::tasks::{Job, Tasks};
 use crate::geo::{Grid, PATCH_COUNT, QUAD_SAMPLES, TILE_CELLS, TILE_QUADS, TileId};
 use crate::pyramid::PyramidError;
 
@@ -44,7 +48,7 @@ impl Errors {
         levels: &Levels,
         grid: &Grid,
         scratch: &Path,
-        watch: &Watch<'_>,
+        tasks: &Tasks<'_>,
     ) -> Result<Self, PyramidError> {
         let data = [grid.rows, grid.columns].map(|count| count as usize);
         let coarser = 0..grid.level_count() - 1;
@@ -54,15 +58,29 @@ impl Errors {
             height_range: [i32::MAX, i32::MIN],
         };
         // A sample on the border of blocks is in both, and one past the last whole block in one more.
-        let [rows, columns] = data.map(|count| count.div_ceil(SIDE));
-        let advance = watch.stage(Stage::Measure, (rows * columns) as u64);
-        let block = |index: usize| {
-            let first = [index / columns * SIDE, index % columns * SIDE];
-            let range = errors.measure_block(levels, first, data)?;
-            advance(1)?;
-            Ok(Range(range))
+        let advance = tasks.watch.stage(Stage::Measure, block_count(grid));
+        let planes: Vec<&dyn Check> = errors
+            .planes
+            .iter()
+            .map(|errors| &errors.plane as _)
+            .collect();
+        let job = Job {
+            pass: "measure",
+            planes: &planes,
+            in_turn: false,
+            advance: &advance,
         };
-        let range = in_order(rows * columns, block, Range::join)?;
+        let parts = parts(grid);
+        let blocks = |task| {
+            let Area { rows, columns } = parts.area(task);
+            rows.flat_map(|row| columns.clone().map(move |column| [row, column]))
+                .collect()
+        };
+        let block = |place: [i64; 2]| {
+            let first = place.map(|index| usize::try_from(index).unwrap_or(0) * SIDE);
+            errors.measure_block(levels, first, data)
+        };
+        let range = tasks.run(&job, blocks, block, Range::join)?.found;
         errors.height_range = range.0;
         Ok(errors)
     }
@@ -72,15 +90,16 @@ impl Errors {
         levels: &Levels,
         first: [usize; 2],
         data: [usize; 2],
-    ) -> Result<[i32; 2], PyramidError> {
+    ) -> Result<Made<Range>, PyramidError> {
         let [rows, columns] =
             [0, 1].map(|axis| first[axis]..(first[axis] + SIDE + 1).min(data[axis]));
         let area = Area::new(rows, columns);
         let Some(finest) = levels.samples.last() else {
-            return Ok([i32::MAX, i32::MIN]);
+            return Ok(Made::default());
         };
         let finest = finest.read(&area)?;
         let finest = Finest::new(&finest);
+        let mut written = Vec::new();
         for (errors, drawn) in self.planes.iter().zip(&levels.samples) {
             let patches = errors.patches(first);
             let samples = |range: &std::ops::Range<usize>| {
@@ -91,9 +110,9 @@ impl Errors {
                 continue;
             }
             let own = Area::new(samples(rows), samples(columns));
-            errors.write(first, &patches, &drawn.read(&own)?, &finest)?;
+            written.push(errors.write(first, &patches, &drawn.read(&own)?, &finest)?);
         }
-        Ok(finest.range())
+        Ok(Made::new(Range(finest.range()), written))
     }
 
     /// The errors of a tile: of the whole of it at stride 1, and of its patches; in units, rounded up. None at the
@@ -104,6 +123,12 @@ impl Errors {
             .map(|errors| errors.tile([tile.row, tile.column]))
             .transpose()
     }
+}
+
+/// The tasks, in blocks.
+pub(super) fn parts(grid: &Grid) -> Blocks {
+    let blocks = [grid.rows, grid.columns].map(|count| (count as usize).div_ceil(SIDE));
+    Blocks::new(blocks, TASK_SIDE / SIDE)
 }
 
 /// Blocks of finest samples that are measured.
@@ -129,7 +154,7 @@ impl ErrorPlane {
             data[axis].div_ceil(entry).min(all)
         });
         Ok(Self {
-            plane: Plane::create(scratch, &format!("errors-{level}"), size)?,
+            plane: Plane::create(scratch, &format!("errors-{level}"), size, TASK_SIDE / entry)?,
             stride,
             entry,
         })
@@ -162,7 +187,7 @@ impl ErrorPlane {
         [rows, columns]: &[std::ops::Range<usize>; 2],
         samples: &Samples,
         finest: &Finest<'_>,
-    ) -> Result<(), PyramidError> {
+    ) -> Result<Written, PyramidError> {
         let drawn = Drawn {
             samples,
             stride: self.stride,
@@ -199,6 +224,7 @@ impl ErrorPlane {
 }
 
 /// Heights from least to greatest.
+#[derive(Debug, Serialize, Deserialize)]
 struct Range([i32; 2]);
 
 impl Default for Range {

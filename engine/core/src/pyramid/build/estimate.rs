@@ -151,14 +151,15 @@ fn passes(
     passes
 }
 
-/// Bytes of planes at the peak: while the finest level is settled, its fitted samples and all settled ones and cages.
+/// Bytes of planes at the end: all levels' samples as fitted and as settled, cages and errors; without the halved planes
+/// that voids take.
 fn scratch_bytes(grid: &Grid) -> u64 {
     let plane = |level: u8| -> u64 {
         let size = plane_size(grid, level).map(|count| count as u64);
         4 * size[0] * size[1]
     };
     let all: u64 = (0..grid.level_count()).map(plane).sum();
-    plane(grid.level_count() - 1) + all + all / 16
+    2 * all + all / 8
 }
 
 /// Bytes and seconds of one thread a finest tile takes, those of all levels above it included.

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use super::errors::ceil_f32;
 use super::ground::StoredGround;
+use super::journal::Made;
 use super::levels::Levels;
+use super::tasks::{Job, Tasks};
 use crate::cage::write_obj;
 use crate::dem::RasterHeader;
 use crate::geo::{Grid, TileId};
@@ -124,15 +126,37 @@ impl Features {
         })
     }
 
-    /// Writes their shards.
+    /// Writes their shards: one task.
     pub(super) fn write(
         &self,
         grid: &Grid,
         writer: &PyramidWriter,
+        tasks: &Tasks<'_>,
     ) -> Result<Vec<ShardInfo>, PyramidError> {
         let Some(metadata) = self.metadata() else {
             return Ok(Vec::new());
         };
+        let job = Job {
+            pass: "features",
+            planes: &[],
+            in_turn: true,
+            advance: &|_| Ok(()),
+        };
+        let work = |()| {
+            Ok(Made {
+                shards: self.write_shards(metadata, grid, writer)?,
+                ..Made::default()
+            })
+        };
+        Ok(tasks.run(&job, |_| vec![()], work, |(), ()| ())?.shards)
+    }
+
+    fn write_shards(
+        &self,
+        metadata: FeatureMetadata,
+        grid: &Grid,
+        writer: &PyramidWriter,
+    ) -> Result<Vec<ShardInfo>, PyramidError> {
         let tiles = grid.tiles(self.finest);
         let [rows, columns] = shard_count(tiles);
         (0..rows)

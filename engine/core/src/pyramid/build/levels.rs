@@ -5,17 +5,20 @@
 
 use std::path::Path;
 
+use serde::{Deserialize, Serialize};
+
 use super::area::{Area, Blocks};
 use super::border::{continued, plane_size};
 use super::fit::{HATS, SPLINES};
-use super::options::{Stage, Watch};
-use super::passes::in_order;
+use super::journal::Made;
+use super::options::Stage;
 use super::plan::Shape;
-use super::planes::{ControlPlane, SamplePlane};
+use super::planes::{ControlPlane, SamplePlane, TASK_SAMPLES, TASK_SIDE};
 use super::quantise::{Cage, is_key, key_width, quantise};
-use super::read::read_finest;
+use super::read::{read_finest, window_count};
 use super::samples::Samples;
 use super::scale::Scale;
+use super::tasks::{Job, Tasks};
 use super::voids::Gaps;
 use crate::dem::Raster;
 use crate::geo::{Grid, QUAD_SAMPLES, TILE_CELLS, TILE_QUADS};
@@ -41,26 +44,27 @@ impl Levels {
         scale: &Scale,
         shape: &Shape,
         scratch: &Path,
-        watch: &Watch<'_>,
+        tasks: &Tasks<'_>,
     ) -> Result<Self, PyramidError> {
         let rise = Rise {
             grid: raster.header().grid,
             scratch,
             side: shape.block_side(),
+            tasks,
         };
-        let (finest, void_count) = rise.finest(raster, scale, shape, watch)?;
-        let fitted = rise.coarser(finest, watch)?;
+        let (finest, void_count) = rise.finest(raster, scale, shape)?;
+        let fitted = rise.coarser(finest)?;
         let mut levels = Self {
             levels: Vec::new(),
             samples: Vec::new(),
             cages: Vec::new(),
             void_count,
         };
-        let tiles = (0..rise.grid.level_count()).map(|level| tile_count(&rise.grid, level));
-        let advance = watch.stage(Stage::Encode, tiles.sum());
+        let blocks = (0..rise.grid.level_count())
+            .map(|level| Blocks::new(settled_size(&rise.grid, level), rise.side).count() as u64);
+        let advance = tasks.watch.stage(Stage::Encode, blocks.sum());
         for (level, fitted) in (0..).zip(fitted) {
             levels.settle(&rise, scale, level, &fitted, &advance)?;
-            fitted.remove()?;
         }
         Ok(levels)
     }
@@ -77,26 +81,24 @@ impl Levels {
         advance: &(dyn Fn(u64) -> Result<(), PyramidError> + Sync),
     ) -> Result<(), PyramidError> {
         let tiles = rise.grid.tiles(level);
-        let side =
-            |per_tile: usize, more: usize| tiles.map(|count| count as usize * per_tile + more);
+        let size = settled_size(&rise.grid, level);
         let settling = Settling {
             fitted,
             parent: self.cages.last().filter(|_| !is_key(level)),
             step: scale.step_at(rise.grid.level_count() - 1 - level),
-            samples: rise.plane("settled", level, side(TILE_CELLS, 1))?,
-            cage: ControlPlane::create(
-                rise.scratch,
-                &format!("cage-{level}"),
-                side(TILE_QUADS, 3),
-            )?,
+            samples: rise.plane("settled", level, size)?,
+            cage: ControlPlane::of_tiles(rise.scratch, &format!("cage-{level}"), tiles)?,
         };
-        let blocks = Blocks::new(settling.samples.size(), rise.side);
-        let block = |index| {
-            let widths = settling.block(&blocks.area(index))?;
-            advance(widths.tiles)?;
-            Ok(widths)
+        let parts = Blocks::new(size, TASK_SIDE);
+        let job = Job {
+            pass: &format!("settle-{level}"),
+            planes: &[&settling.samples, &settling.cage],
+            in_turn: false,
+            advance,
         };
-        let widths = in_order(blocks.count(), block, Widths::join)?;
+        let blocks = |task| parts.area(task).blocks(rise.side);
+        let block = |area| settling.block(&area);
+        let widths = rise.tasks.run(&job, blocks, block, Widths::join)?.found;
         self.levels.push(Level {
             tiles,
             step: settling.step,
@@ -117,6 +119,7 @@ struct Rise<'a> {
     scratch: &'a Path,
     /// Samples a side of a block.
     side: usize,
+    tasks: &'a Tasks<'a>,
 }
 
 impl Rise<'_> {
@@ -130,16 +133,17 @@ impl Rise<'_> {
         raster: &dyn Raster,
         scale: &Scale,
         shape: &Shape,
-        watch: &Watch<'_>,
     ) -> Result<(SamplePlane, u64), PyramidError> {
         let grid = &self.grid;
         let level = grid.level_count() - 1;
         let plane = self.plane("fitted", level, plane_size(grid, level))?;
         let [rows, columns] = [grid.rows, grid.columns];
         let total = u64::from(rows) * u64::from(columns);
-        let advance = watch.stage(Stage::Read, total);
+        let windows = window_count(raster, shape.window_samples);
+        let advance = self.tasks.watch.stage(Stage::Read, windows);
         let name = &raster.header().source.name;
-        let void_count = read_finest(raster, scale.unit(), &plane, shape.window_samples, &advance)
+        let heard = (self.tasks, &advance as &(dyn Fn(u64) -> _ + Sync));
+        let void_count = read_finest(raster, scale.unit(), &plane, shape.window_samples, heard)
             .map_err(|error| match error {
                 PyramidError::Unfit(what) => PyramidError::Unfit(format!("{name}: {what}")),
                 other => other,
@@ -150,59 +154,57 @@ impl Rise<'_> {
             )));
         }
         let data = [rows, columns].map(|count| count as usize);
-        if void_count > 0 {
-            let gaps = Gaps {
-                scratch: self.scratch,
-                side: self.side,
-                watch,
-            };
-            gaps.fill(&plane, data)?;
-        }
-        self.continue_finest(&plane, data, watch)?;
+        let gaps = Gaps {
+            scratch: self.scratch,
+            side: self.side,
+            task_samples: TASK_SAMPLES,
+            tasks: self.tasks,
+        };
+        gaps.fill(&plane, data, void_count > 0)?;
+        self.continue_finest(&plane, data)?;
         Ok((plane, void_count))
     }
 
-    fn continue_finest(
-        &self,
-        plane: &SamplePlane,
-        data: [usize; 2],
-        watch: &Watch<'_>,
-    ) -> Result<(), PyramidError> {
+    fn continue_finest(&self, plane: &SamplePlane, data: [usize; 2]) -> Result<(), PyramidError> {
         let size = plane.size();
-        let east = Area::new(0..data[0], data[1]..size[1]);
-        let south = Area::new(data[0]..size[0], 0..size[1]);
-        let blocks = Blocks::new(size, self.side);
-        let block = |index| {
-            watch.check()?;
-            for part in [&east, &south].map(|beyond| blocks.area(index).and(beyond)) {
-                if !part.is_empty() {
-                    let samples = continued(&part, data, size, |area| plane.read(area))?;
-                    plane.write(&part, &samples)?;
-                }
-            }
-            Ok(())
+        let job = Job {
+            pass: "continue",
+            planes: &[plane],
+            in_turn: false,
+            advance: &|_| Ok(()),
         };
-        in_order(blocks.count(), block, |(), ()| ())
+        let parts = beyond(data, size);
+        let blocks = |task: usize| parts[task].blocks(self.side);
+        let block = |area| {
+            let samples = continued(&area, data, size, |area| plane.read(area))?;
+            Ok(Made::new((), [plane.write(&area, &samples)?]))
+        };
+        self.tasks.run(&job, blocks, block, |(), ()| ())?;
+        Ok(())
     }
 
     /// The samples of all levels, coarsest first, from the finest's.
-    fn coarser(
-        &self,
-        finest: SamplePlane,
-        watch: &Watch<'_>,
-    ) -> Result<Vec<SamplePlane>, PyramidError> {
+    fn coarser(&self, finest: SamplePlane) -> Result<Vec<SamplePlane>, PyramidError> {
         let coarser = 0..self.grid.level_count() - 1;
         let blocks = coarser.clone().map(|level| {
             let blocks = fit_blocks(&self.grid, level, self.side);
             blocks.count() as u64
         });
-        let advance = watch.stage(Stage::Fit, blocks.sum());
+        let advance = self.tasks.watch.stage(Stage::Fit, blocks.sum());
         let mut planes = vec![finest];
         for level in coarser.rev() {
             let coarse = self.plane("fitted", level, plane_size(&self.grid, level))?;
             if let Some(fine) = planes.last() {
-                let blocks = fit_blocks(&self.grid, level, self.side);
-                coarsen(fine, &coarse, blocks, &advance)?;
+                let job = Job {
+                    pass: &format!("fit-{level}"),
+                    planes: &[&coarse],
+                    in_turn: false,
+                    advance: &advance,
+                };
+                let parts = Blocks::new(coarse.size(), TASK_SIDE);
+                let blocks = |task| parts.area(task).blocks(self.side / 2);
+                let block = |area| coarsen(fine, &coarse, &area);
+                self.tasks.run(&job, blocks, block, |(), ()| ())?;
             }
             planes.push(coarse);
         }
@@ -211,31 +213,43 @@ impl Rise<'_> {
     }
 }
 
+/// The parts of a plane past the data, to the south and to the east of them, as far as each is one task's.
+pub(super) fn beyond(data: [usize; 2], size: [usize; 2]) -> Vec<Area> {
+    let parts = Blocks::new(size, TASK_SIDE);
+    let south = Area::new(data[0]..size[0], 0..size[1]);
+    let east = Area::new(0..data[0], data[1]..size[1]);
+    let parts = (0..parts.count()).map(|index| parts.area(index));
+    parts
+        .flat_map(|part| [&south, &east].map(|beyond| part.and(beyond)))
+        .filter(|part| !part.is_empty())
+        .collect()
+}
+
+/// Rows and columns of a level's samples as stored: of whole tiles.
+pub(super) fn settled_size(grid: &Grid, level: u8) -> [usize; 2] {
+    grid.tiles(level)
+        .map(|count| count as usize * TILE_CELLS + 1)
+}
+
 /// The blocks in which a coarser level is fitted: half as wide as those of the finer level that they are fitted to.
 pub(super) fn fit_blocks(grid: &Grid, level: u8, side: usize) -> Blocks {
     Blocks::new(plane_size(grid, level), side / 2)
 }
 
-/// Fits a coarser level to a finer one.
+/// Fits an area of a coarser level to a finer one.
 fn coarsen(
     fine: &SamplePlane,
     coarse: &SamplePlane,
-    blocks: Blocks,
-    advance: &(dyn Fn(u64) -> Result<(), PyramidError> + Sync),
-) -> Result<(), PyramidError> {
+    area: &Area,
+) -> Result<Made<()>, PyramidError> {
     let fitted = fine.size().map(|samples| samples / 2 + 1);
-    let block = |index| {
-        let area = blocks.area(index);
-        let samples = continued(&area, fitted, coarse.size(), |area| {
-            let below = fine.read_mirrored(&HATS.support(area))?;
-            let mut samples = Samples::new(area.clone(), HATS.fit(area, &below));
-            below.mark_coarser_voids(&mut samples);
-            Ok(samples)
-        })?;
-        coarse.write(&area, &samples)?;
-        advance(1)
-    };
-    in_order(blocks.count(), block, |(), ()| ())
+    let samples = continued(area, fitted, coarse.size(), |area| {
+        let below = fine.read_mirrored(&HATS.support(area))?;
+        let mut samples = Samples::new(area.clone(), HATS.fit(area, &below));
+        below.mark_coarser_voids(&mut samples);
+        Ok(samples)
+    })?;
+    Ok(Made::new((), [coarse.write(area, &samples)?]))
 }
 
 /// A level on the way down.
@@ -250,7 +264,7 @@ struct Settling<'a> {
 
 impl Settling<'_> {
     /// Settles the tiles of a block of samples.
-    fn block(&self, own: &Area) -> Result<Widths, PyramidError> {
+    fn block(&self, own: &Area) -> Result<Made<Widths>, PyramidError> {
         let cells = |count: i64| usize::try_from(count).unwrap_or(0) / TILE_CELLS;
         let [rows, columns] = [&own.rows, &own.columns].map(|r| cells(r.start)..cells(r.end));
         let tiles = [rows.len(), columns.len()];
@@ -269,7 +283,7 @@ impl Settling<'_> {
         let fitted = fitted.crop(&Area::new(cells(&rows), cells(&columns)));
         let mut widths = self.quantise(&mut cage, &controls, tiles)?;
         let settled = self.settle(&fitted, &cage, tiles, &mut widths);
-        self.samples.write(own, &settled)?;
+        let samples = self.samples.write(own, &settled)?;
         // The last tiles' controls past the tile are its own, others' the next block's.
         let end = |own_end: i64, first: usize, all: usize| {
             let end = usize::try_from(own_end).unwrap_or(0) / QUAD_SAMPLES;
@@ -280,8 +294,8 @@ impl Settling<'_> {
             end(own.rows.end, rows.start * TILE_QUADS, all_rows),
             end(own.columns.end, columns.start * TILE_QUADS, all_columns),
         );
-        self.cage.put_controls(&owned, &controls, cage.controls())?;
-        Ok(widths)
+        let cage = self.cage.put_controls(&owned, &controls, cage.controls())?;
+        Ok(Made::new(widths, [samples, cage]))
     }
 
     fn quantise(
@@ -306,7 +320,6 @@ impl Settling<'_> {
         };
         Ok(Widths {
             cage,
-            tiles: tiles.map(|count| count as u64).iter().product(),
             ..Widths::default()
         })
     }
@@ -334,13 +347,11 @@ impl Settling<'_> {
 }
 
 /// How wide the numbers of a level are, and whether it has voids.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Widths {
     cage: u8,
     detail: u8,
     voids: bool,
-    /// Tiles they are of.
-    tiles: u64,
 }
 
 impl Default for Widths {
@@ -349,7 +360,6 @@ impl Default for Widths {
             cage: 1,
             detail: 1,
             voids: false,
-            tiles: 0,
         }
     }
 }
@@ -360,7 +370,6 @@ impl Widths {
             cage: self.cage.max(other.cage),
             detail: self.detail.max(other.detail),
             voids: self.voids | other.voids,
-            tiles: self.tiles + other.tiles,
         }
     }
 }

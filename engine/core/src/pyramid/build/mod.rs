@@ -12,11 +12,16 @@
 mod area;
 mod border;
 mod color;
+mod distribute;
 mod errors;
 mod estimate;
 mod features;
+mod finished;
 mod fit;
+mod graph;
 mod ground;
+mod inputs;
+mod journal;
 mod levels;
 mod measure;
 mod options;
@@ -29,6 +34,7 @@ mod records;
 mod samples;
 mod scale;
 mod scratch;
+mod tasks;
 #[cfg(test)]
 pub(crate) mod testing;
 #[cfg(test)]
@@ -36,21 +42,27 @@ pub(crate) mod testing;
 mod tests;
 mod voids;
 
-use std::sync::atomic::AtomicBool;
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
+pub use distribute::{PlannedTask, finish, plan_tasks, run_task};
 pub use estimate::{BuildPlan, PassPlan, plan};
+pub use inputs::InputStamp;
 pub use options::{BuildOptions, BuildReport, Imagery, Progress, Stage};
 
 use self::errors::Errors;
 use self::features::Features;
+use self::journal::{Journal, Made};
 use self::levels::Levels;
 use self::options::Watch;
 use self::plan::Shape;
 use self::records::Records;
 use self::scale::Scale;
-use super::{Metadata, PyramidError, PyramidWriter, ShardInfo, files::remove_folder};
-use crate::dem::{Image, Raster};
+use self::tasks::{Job, Tasks, Want};
+use super::{BuildMetadata, ColorMetadata, Metadata, PyramidError, PyramidWriter, ShardInfo};
+use crate::dem::{DemError, Image, Raster};
 use crate::geo::Grid;
 
 /// The version of the builder's arithmetic: to be raised with every change after which the same input gives other
@@ -60,7 +72,7 @@ const BUILDER: u32 = 2;
 /// Builds a pyramid.
 ///
 /// `progress` is called often and from any thread. When `cancel` becomes true the build stops at the next window, block
-/// or shard; the shards it has written are kept by the next run with the same options, where sources are named.
+/// or shard; what it has done is kept by the next run with the same options, where sources are named.
 ///
 /// # Errors
 /// [`PyramidError::Refused`] for options that cannot be met or an output that is something else;
@@ -76,34 +88,21 @@ pub fn build(
 ) -> Result<BuildReport, PyramidError> {
     let start = Instant::now();
     let plan = Plan::new(raster, imagery, options)?;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(plan.shape.threads)
-        .build()
-        .map_err(|error| {
-            PyramidError::Refused(format!("the threads could not be started: {error}"))
-        })?;
+    if !options.overwrite
+        && let Some(report) = finished::report(&options.output, &plan.fingerprint)
+    {
+        return Ok(report);
+    }
     let writer = PyramidWriter::resume(&options.output, options.overwrite, &plan.fingerprint)?;
     let watch = Watch::new(progress, cancel);
-    let made = pool.install(|| plan.run(raster, imagery, options, &writer, &watch));
-    match made {
-        Ok((metadata, shards, report)) => {
-            writer.publish(&metadata, &shards)?;
-            Ok(BuildReport {
-                seconds: start.elapsed().as_secs_f64(),
-                ..report
-            })
-        }
-        Err(error) => {
-            let resumable = matches!(error, PyramidError::Interrupted | PyramidError::Io { .. });
-            // The first error is the one to tell; what cannot be removed now, the next run removes.
-            let _ = if resumable && !plan.fingerprint.is_empty() {
-                remove_folder(&writer.scratch())
-            } else {
-                writer.discard()
-            };
-            Err(error)
-        }
+    if writer.started_over() {
+        drop(watch.stage(Stage::StartOver, 0));
     }
+    let report = plan.carry_out(raster, imagery, options, (writer, Want::Whole), &watch)?;
+    Ok(BuildReport {
+        seconds: start.elapsed().as_secs_f64(),
+        ..report.unwrap_or_default()
+    })
 }
 
 /// What is settled before anything is read.
@@ -137,20 +136,80 @@ impl Plan {
         })
     }
 
+    /// Does what is wanted; a report where that is a pyramid.
+    fn carry_out(
+        &self,
+        raster: &dyn Raster,
+        imagery: Option<&Imagery<'_>>,
+        options: &BuildOptions,
+        (writer, want): (PyramidWriter, Want),
+        watch: &Watch<'_>,
+    ) -> Result<Option<BuildReport>, PyramidError> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(self.shape.threads)
+            .build()
+            .map_err(|error| {
+                PyramidError::Refused(format!("the threads could not be started: {error}"))
+            })?;
+        let tasks = Tasks {
+            passes: graph::passes(raster, imagery, !options.features.is_empty()),
+            want,
+            folder: writer.folder().to_owned(),
+            watch,
+            journal: Journal::new(writer.journal()),
+            kept: AtomicUsize::new(0),
+            done: AtomicBool::new(false),
+        };
+        let made = pool.install(|| {
+            let made = self.run(raster, imagery, options, &writer, &tasks);
+            match (&made, tasks.done.load(Ordering::Relaxed)) {
+                (Ok(_), _) | (_, true) => inputs::check(&options.inputs).and(made),
+                _ => made,
+            }
+        });
+        match made {
+            Ok(_) if matches!(want, Want::Task(_)) => Ok(None),
+            Ok((metadata, shards, report)) => {
+                if want == Want::Finish {
+                    check_there(writer.folder(), &shards)?;
+                }
+                writer.publish(&metadata, &shards)?;
+                Ok(Some(BuildReport {
+                    memory_bytes: self.shape.memory_bytes,
+                    kept_tasks: tasks.kept.load(Ordering::Relaxed),
+                    ..report
+                }))
+            }
+            Err(PyramidError::Interrupted) if tasks.done.load(Ordering::Relaxed) => Ok(None),
+            Err(error) => {
+                let resumable = matches!(
+                    error,
+                    PyramidError::Interrupted
+                        | PyramidError::Io { .. }
+                        | PyramidError::Dem(DemError::Io { .. })
+                );
+                if want == Want::Whole && (!resumable || self.fingerprint.is_empty()) {
+                    // The first error is the one to tell; what cannot be removed now, the next run removes.
+                    let _ = writer.discard();
+                }
+                Err(error)
+            }
+        }
+    }
+
     fn run(
         &self,
         raster: &dyn Raster,
         imagery: Option<&Imagery<'_>>,
         options: &BuildOptions,
         writer: &PyramidWriter,
-        watch: &Watch<'_>,
+        tasks: &Tasks<'_>,
     ) -> Result<(Metadata, Vec<ShardInfo>, BuildReport), PyramidError> {
         let (grid, unit) = (&self.grid, self.scale.unit());
         let scratch = writer.scratch();
-        remove_folder(&scratch)?;
-        let levels = Levels::new(raster, &self.scale, &self.shape, &scratch, watch)?;
+        let levels = Levels::new(raster, &self.scale, &self.shape, &scratch, tasks)?;
+        let errors = Errors::measure(&levels, grid, &scratch, tasks)?;
         let features = Features::new(&options.features, &levels, raster.header(), unit)?;
-        let errors = Errors::measure(&levels, grid, &scratch, watch)?;
         let records = Records {
             levels: &levels,
             errors: &errors,
@@ -158,25 +217,22 @@ impl Plan {
             grid,
             unit,
         };
-        let (mut shards, root) = records.write(writer, &scratch, watch)?;
-        remove_folder(&scratch)?;
+        let (mut shards, root_error) = records.write(writer, &scratch, tasks)?;
         let height_range = errors.height_range;
-        let mut report = self.report(options, &shards, f64::from(root.error));
-        report.void_samples = levels.void_count;
-        let feature_shards = features.write(grid, writer)?;
-        report.features = features.count();
-        report.feature_bytes = feature_shards.iter().map(|info| info.bytes).sum();
-        shards.extend(feature_shards);
+        shards.extend(features.write(grid, writer, tasks)?);
         let color = imagery
-            .map(|imagery| color::write(imagery, grid, writer, watch))
+            .map(|imagery| self.color(imagery, writer, tasks))
             .transpose()?
             .map(|(color, infos)| {
-                report.color_levels = color.levels;
-                report.color_bytes = infos.iter().map(|info| info.bytes).sum();
                 shards.extend(infos);
                 color
             });
-        let metadata = Metadata {
+        let build = BuildMetadata {
+            key: finished::key(&self.fingerprint),
+            void_samples: levels.void_count,
+            root_error: f64::from(root_error),
+        };
+        let mut metadata = Metadata {
             version: Metadata::VERSION,
             grid: *grid,
             crs: raster.header().crs.clone(),
@@ -188,35 +244,55 @@ impl Plan {
             color,
             features: features.metadata(),
             sources: options.sources.clone(),
+            build: None,
         };
+        let report = finished::of(&metadata, &build, &shards);
+        metadata.build = (!self.fingerprint.is_empty()).then_some(build);
         Ok((metadata, shards, report))
     }
 
-    fn report(&self, options: &BuildOptions, shards: &[ShardInfo], root_error: f64) -> BuildReport {
-        let grid = &self.grid;
-        let level_bytes: Vec<u64> = (0..grid.level_count())
-            .map(|level| {
-                let prefix = format!("tile/{level}/");
-                shards
-                    .iter()
-                    .filter(|info| info.key.starts_with(&prefix))
-                    .map(|info| info.bytes)
-                    .sum()
+    /// The imagery: one task, whose shards are kept by the writer where it is interrupted.
+    fn color(
+        &self,
+        imagery: &Imagery<'_>,
+        writer: &PyramidWriter,
+        tasks: &Tasks<'_>,
+    ) -> Result<(ColorMetadata, Vec<ShardInfo>), PyramidError> {
+        let job = Job {
+            pass: "color",
+            planes: &[],
+            in_turn: true,
+            advance: &|_| Ok(()),
+        };
+        let work = |()| {
+            let (color, shards) = color::write(imagery, &self.grid, writer, tasks.watch)?;
+            Ok(Made {
+                shards,
+                ..Made::new(Some(color), [])
             })
-            .collect();
-        BuildReport {
-            samples: [grid.rows, grid.columns],
-            source_bytes: options.sources.iter().map(|source| source.bytes).sum(),
-            levels: grid.level_count(),
-            tiles: shards.iter().map(|info| u64::from(info.chunks)).sum(),
-            eps: self.scale.eps,
-            unit: self.scale.unit(),
-            root_error,
-            height_bytes: level_bytes.iter().sum(),
-            level_bytes,
-            memory_bytes: self.shape.memory_bytes,
-            ..BuildReport::default()
-        }
+        };
+        let made = tasks.run(&job, |_| vec![()], work, Option::or)?;
+        let color = made.found.ok_or_else(|| {
+            PyramidError::Refused("the imagery of an earlier run was not understood".into())
+        })?;
+        Ok((color, made.shards))
+    }
+}
+
+/// Says which shard is not there, or not of its size.
+fn check_there(folder: &Path, shards: &[ShardInfo]) -> Result<(), PyramidError> {
+    let there = |shard: &&ShardInfo| {
+        fs::metadata(folder.join(&shard.key)).is_ok_and(|about| about.len() == shard.bytes)
+    };
+    match shards.iter().find(|shard| !there(shard)) {
+        None => Ok(()),
+        Some(shard) => Err(PyramidError::Invalid {
+            path: folder.join(&shard.key),
+            what: format!(
+                "is to be a shard of {} bytes; do its task again",
+                shard.bytes
+            ),
+        }),
     }
 }
 
@@ -229,12 +305,13 @@ fn fingerprint(
 ) -> String {
     let header = raster.header();
     let extents = |images: &[Image]| images.iter().map(|image| image.extent).collect::<Vec<_>>();
-    let imagery = imagery.map(|imagery| (&imagery.sources, extents(imagery.images)));
+    let imagery = imagery.map(|imagery| (&imagery.sources, extents(imagery.images), imagery.codec));
     format!(
-        "builder {BUILDER} {:?} {:?} {} {scale:?} {:?} {imagery:?} {}",
+        "builder {BUILDER} {:?} {:?} {} {scale:?} {:?} {:?} {imagery:?} {}",
         header.grid,
         header.crs,
         header.reading,
+        options.vertical,
         options.sources,
         features::fingerprint(&options.features)
     )

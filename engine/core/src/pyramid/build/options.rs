@@ -5,9 +5,10 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use serde::Serialize;
 
+use super::inputs::InputStamp;
 use crate::dem::Image;
 use crate::pyramid::feature::FeatureInput;
-use crate::pyramid::{PyramidError, SourceMetadata, VerticalReference};
+use crate::pyramid::{ColorCodec, PyramidError, SourceMetadata, VerticalReference};
 
 /// What a build is asked for.
 #[derive(Clone, Debug, Default)]
@@ -32,6 +33,8 @@ pub struct BuildOptions {
     pub features: Vec<FeatureInput>,
     /// The input files, as the metadata name them. With them, an interrupted build is gone on with.
     pub sources: Vec<SourceMetadata>,
+    /// The files that must not change while they are read, as they were before.
+    pub inputs: Vec<InputStamp>,
 }
 
 /// Imagery to drape over the terrain.
@@ -39,6 +42,8 @@ pub struct BuildOptions {
 pub struct Imagery<'a> {
     /// The pictures, later ones over earlier ones; one without an extent is stretched over the elevation model.
     pub images: &'a [Image],
+    /// How its tiles are stored.
+    pub codec: ColorCodec,
     /// Its files.
     pub sources: Vec<SourceMetadata>,
 }
@@ -47,6 +52,8 @@ pub struct Imagery<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Stage {
+    /// Throwing away what an earlier run left, of other inputs or options or by another version.
+    StartOver,
     /// Reading the raster.
     Read,
     /// Fitting coarser samples and cages.
@@ -66,6 +73,7 @@ impl Stage {
     #[must_use]
     pub const fn label(self) -> &'static str {
         match self {
+            Self::StartOver => "starting over",
             Self::Read => "reading",
             Self::Fit => "fitting",
             Self::Encode => "encoding",
@@ -120,6 +128,10 @@ pub struct BuildReport {
     pub color_bytes: u64,
     /// Memory the plan allows for, in bytes.
     pub memory_bytes: u64,
+    /// Tasks that an earlier run had done.
+    pub kept_tasks: usize,
+    /// The pyramid was there already, of the same inputs and options and by the same version: nothing was done.
+    pub unchanged: bool,
     /// Wall time in seconds.
     pub seconds: f64,
 }

@@ -5,12 +5,18 @@ use std::path::Path;
 use super::area::Area;
 use super::border::mirrored;
 use super::samples::Samples;
-use super::scratch::Plane;
+use super::scratch::{Check, Plane, Written};
+use crate::geo::{QUAD_SAMPLES, TILE_QUADS};
 use crate::pyramid::PyramidError;
 
 /// Heights are under this many units, so that doubled and marked they are a number. Those that are read are under 2²⁵;
 /// fitted and continued ones may overshoot that, and are refused here.
 const HEIGHT_LIMIT: i32 = 1 << 30;
+
+/// Rows and columns of a file of samples: as many as a task makes, which is so the only one to write it.
+pub(super) const TASK_SIDE: usize = 4096;
+/// Samples of a task.
+pub(super) const TASK_SAMPLES: u64 = (TASK_SIDE * TASK_SIDE) as u64;
 
 /// Samples, each one number: the height in units, doubled, plus one where it is void.
 #[derive(Debug)]
@@ -23,7 +29,7 @@ impl SamplePlane {
         name: &str,
         size: [usize; 2],
     ) -> Result<Self, PyramidError> {
-        Plane::create(scratch, name, size).map(Self)
+        Plane::create(scratch, name, size, TASK_SIDE).map(Self)
     }
 
     /// Rows and columns.
@@ -54,7 +60,7 @@ impl SamplePlane {
     ///
     /// # Errors
     /// [`PyramidError::Unfit`] for a height too large to be marked; what the disk says.
-    pub(super) fn write(&self, area: &Area, samples: &Samples) -> Result<(), PyramidError> {
+    pub(super) fn write(&self, area: &Area, samples: &Samples) -> Result<Written, PyramidError> {
         let packed = samples.values.iter().map(|height| pack(*height));
         let mut packed = packed.collect::<Result<Vec<[i32; 1]>, _>>()?;
         if samples.voids.is_some() {
@@ -65,9 +71,22 @@ impl SamplePlane {
         self.0.write(area, &samples.area, &packed)
     }
 
+    /// As [`Self::write`], of samples whose void ones are 0 and will be filled.
+    pub(super) fn write_unfilled(&self, samples: &Samples) -> Result<Written, PyramidError> {
+        let mut written = self.write(&samples.area, samples)?;
+        written.to_be_filled = samples.voids.is_some();
+        Ok(written)
+    }
+
     /// Removes the plane from the disk.
     pub(super) fn remove(self) -> Result<(), PyramidError> {
         self.0.remove()
+    }
+}
+
+impl Check for SamplePlane {
+    fn holds(&self, written: &Written) -> bool {
+        self.0.holds(written)
     }
 }
 
@@ -84,6 +103,16 @@ fn pack(height: i32) -> Result<[i32; 1], PyramidError> {
 pub(super) type ControlPlane = Plane<1>;
 
 impl ControlPlane {
+    /// A plane of the controls of so many rows and columns of tiles.
+    pub(super) fn of_tiles(
+        scratch: &Path,
+        name: &str,
+        tiles: [u32; 2],
+    ) -> Result<Self, PyramidError> {
+        let size = tiles.map(|count| count as usize * TILE_QUADS + 3);
+        Self::create(scratch, name, size, TASK_SIDE / QUAD_SAMPLES)
+    }
+
     /// The controls of an area of the plane, row by row.
     pub(super) fn controls(&self, area: &Area) -> Result<Vec<i32>, PyramidError> {
         Ok(self.read(area)?.into_flattened())
@@ -95,7 +124,7 @@ impl ControlPlane {
         area: &Area,
         within: &Area,
         controls: &[i32],
-    ) -> Result<(), PyramidError> {
+    ) -> Result<Written, PyramidError> {
         let (entries, _) = controls.as_chunks::<1>();
         self.write(area, within, entries)
     }

@@ -11,13 +11,15 @@ use lru::LruCache;
 use super::area::Area;
 use super::errors::{Errors, ceil_f32};
 use super::features::Features;
+use super::journal::Made;
 use super::levels::Levels;
 use super::measure::PatchErrors;
-use super::options::{Stage, Watch};
+use super::options::Stage;
 use super::passes::in_order;
 use super::quantise::Cage;
 use super::samples::Samples;
 use super::scratch::Plane;
+use super::tasks::{Job, Tasks};
 use crate::geo::{Grid, PATCH_COUNT, TILE_CELLS, TILE_QUADS, TileId};
 use crate::pyramid::surface::{child_window, encode_detail, encode_key_controls};
 use crate::pyramid::{
@@ -41,39 +43,38 @@ pub(super) struct Records<'a> {
 }
 
 impl Records<'_> {
-    /// Writes all shards, finest level first. Returns them, and the root's summary.
+    /// Writes all shards, finest level first. Returns them, and the root's error.
     pub(super) fn write(
         &self,
         writer: &PyramidWriter,
         scratch: &Path,
-        watch: &Watch<'_>,
-    ) -> Result<(Vec<ShardInfo>, Summary), PyramidError> {
-        let shards_of = |level: u8| {
-            let [rows, columns] = shard_count(self.grid.tiles(level));
-            (0..rows).flat_map(move |row| (0..columns).map(move |column| [row, column]))
-        };
-        let total = (0..self.grid.level_count())
-            .map(|level| shards_of(level).count() as u64)
-            .sum();
-        let advance = watch.stage(Stage::Write, total);
+        tasks: &Tasks<'_>,
+    ) -> Result<(Vec<ShardInfo>, f32), PyramidError> {
+        let levels = 0..self.grid.level_count();
+        let total = levels.clone().map(|level| shards(self.grid, level).len());
+        let advance = tasks.watch.stage(Stage::Write, total.sum::<usize>() as u64);
         let mut infos = Vec::new();
+        let mut root_error = 0.0;
         let mut finer: Option<Plane<4>> = None;
-        for level in (0..self.grid.level_count()).rev() {
+        for level in levels.rev() {
             let size = self.grid.tiles(level).map(|count| count as usize);
-            let own = Plane::create(scratch, &format!("summary-{level}"), size)?;
-            for shard in shards_of(level) {
-                infos.push(self.write_shard(level, shard, writer, &own, finer.as_ref())?);
-                advance(1)?;
-            }
-            if let Some(finer) = finer.replace(own) {
-                finer.remove()?;
-            }
+            let side = SHARD_TILES as usize;
+            let own = Plane::create(scratch, &format!("summary-{level}"), size, side)?;
+            let job = Job {
+                pass: &format!("write-{level}"),
+                planes: &[&own],
+                in_turn: true,
+                advance: &advance,
+            };
+            let shards = shards(self.grid, level);
+            let shard = |shard| self.write_shard(level, shard, writer, &own, finer.as_ref());
+            let made = tasks.run(&job, |task| vec![shards[task]], shard, u32::max)?;
+            infos.extend(made.shards);
+            // Errors are no less than 0, and so of the order of their bits.
+            root_error = f32::from_bits(made.found);
+            finer = Some(own);
         }
-        let root = match finer {
-            Some(plane) => from_bits(plane.read(&Area::whole([1, 1]))?[0]),
-            None => Summary::default(),
-        };
-        Ok((infos, root))
+        Ok((infos, root_error))
     }
 
     fn write_shard(
@@ -83,7 +84,7 @@ impl Records<'_> {
         writer: &PyramidWriter,
         own: &Plane<4>,
         finer: Option<&Plane<4>>,
-    ) -> Result<ShardInfo, PyramidError> {
+    ) -> Result<Made<u32>, PyramidError> {
         let tiles = self.grid.tiles(level);
         let groups: Vec<[u32; 2]> = groups_of(tiles, shard);
         let measure = |index: usize| {
@@ -109,7 +110,9 @@ impl Records<'_> {
             let at = (row - first[0]) * area.size()[1] + column - first[1];
             summaries[at] = to_bits(&tile.summary);
         }
-        own.write(&area, &area, &summaries)?;
+        let summaries = own.write(&area, &area, &summaries)?;
+        let error = measured.iter().map(|tile| tile.summary.error.to_bits());
+        let error = error.max().unwrap_or(0);
         let by_tile: HashMap<TileId, Measured> =
             measured.into_iter().map(|tile| (tile.id, tile)).collect();
         let about = &self.levels.levels[usize::from(level)];
@@ -122,7 +125,11 @@ impl Records<'_> {
             let group = self.kept_group(&groups, tile)?;
             Ok(Some(group.record(about, &layout, measured)))
         };
-        writer.write_shard(level, &layout, tiles, shard, &record)
+        let shard = writer.write_shard(level, &layout, tiles, shard, &record)?;
+        Ok(Made {
+            shards: vec![shard],
+            ..Made::new(error, [summaries])
+        })
     }
 
     /// A tile's group, from the last used ones or read.
@@ -216,6 +223,14 @@ impl Records<'_> {
             patch_codes: patch_codes(patches, base, self.unit),
         })
     }
+}
+
+/// The shards of a level, row by row.
+pub(super) fn shards(grid: &Grid, level: u8) -> Vec<[u32; 2]> {
+    let [rows, columns] = shard_count(grid.tiles(level));
+    (0..rows)
+        .flat_map(|row| (0..columns).map(move |column| [row, column]))
+        .collect()
 }
 
 /// The groups of a shard, row by row.

@@ -1,44 +1,100 @@
 //! Planes of numbers on the disk, larger than memory: what one pass of a build leaves for the next.
 //!
 //! ```text
-//! scratch/NAME/R.C     rows 4096 R … and columns 4096 C … of a plane, row by row, little-endian
+//! scratch/NAME/R.C     rows S R … and columns S C … of a plane of S × S files, row by row, little-endian
 //! ```
 //!
 //! Any number of threads read and write rectangles; whoever writes a place is its only writer, and passes that read a
 //! plane start when the one that wrote it is done. Files are opened for every access: passes touch each a few times,
-//! and a plane may have more files than a process may open. Knows numbers; knows no height.
+//! and a plane may have more files than a process may open. Nothing is flushed: whoever goes on with what an earlier
+//! process left asks whether it still [holds](Written). Knows numbers; knows no height.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
 
 use super::area::{Area, Blocks};
 use crate::pyramid::PyramidError;
 use crate::pyramid::files::{read_exact_at, write_all_at};
 
-/// Rows and columns of a file: as many as the samples of a shard's tiles.
-const FILE_SIDE: usize = 4096;
-
 /// A plane of entries of `N` numbers each.
 #[derive(Debug)]
 pub(super) struct Plane<const N: usize> {
     folder: PathBuf,
+    name: String,
     size: [usize; 2],
+    /// Rows and columns of a file.
+    side: usize,
     blocks: Blocks,
 }
 
+/// A rectangle as it was written to a plane.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Written {
+    /// The plane's name.
+    plane: String,
+    /// First row, first column, row past the last, column past the last.
+    area: [i64; 4],
+    /// CRC32C of the bytes, in the order of the files.
+    crc32c: u32,
+    /// A later pass fills what is odd, the void samples: they are counted as 1.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub(super) to_be_filled: bool,
+}
+
+/// What can say whether a rectangle is still as it was written.
+pub(super) trait Check: Sync {
+    /// True where it is.
+    fn holds(&self, written: &Written) -> bool;
+}
+
+impl<const N: usize> Check for Plane<N> {
+    fn holds(&self, written: &Written) -> bool {
+        let [row, column, row_end, column_end] = written.area;
+        let area = Area {
+            rows: row..row_end,
+            columns: column..column_end,
+        };
+        if written.plane != self.name || !Area::whole(self.size).contains(&area) {
+            return false;
+        }
+        let (mut sum, mut numbers) = (0, Vec::<i32>::new());
+        let read = self.parts(&area, |file, path, run| {
+            numbers.resize(run.entries.len() * N, 0);
+            read_exact_at(file, bytemuck::cast_slice_mut(&mut numbers), run.offset)
+                .map_err(PyramidError::io("reading", path))?;
+            if written.to_be_filled {
+                for number in &mut numbers {
+                    if i32::from_le(*number) & 1 == 1 {
+                        *number = 1_i32.to_le();
+                    }
+                }
+            }
+            sum = crc32c::crc32c_append(sum, bytemuck::cast_slice(&numbers));
+            Ok(())
+        });
+        read.is_ok() && sum == written.crc32c
+    }
+}
+
 impl<const N: usize> Plane<N> {
-    /// A plane of so many rows and columns in a folder of its own; its entries are to be written before they are read.
+    /// A plane of so many rows and columns, `side` of each a file, in a folder of its own, which may be there; its
+    /// entries are to be written before they are read.
     pub(super) fn create(
         scratch: &Path,
         name: &str,
         size: [usize; 2],
+        side: usize,
     ) -> Result<Self, PyramidError> {
         let folder = scratch.join(name);
         fs::create_dir_all(&folder).map_err(PyramidError::io("creating", &folder))?;
         Ok(Self {
             folder,
+            name: name.to_owned(),
             size,
-            blocks: Blocks::new(size, FILE_SIDE),
+            side,
+            blocks: Blocks::new(size, side),
         })
     }
 
@@ -67,10 +123,11 @@ impl<const N: usize> Plane<N> {
         area: &Area,
         within: &Area,
         entries: &[[i32; N]],
-    ) -> Result<(), PyramidError> {
+    ) -> Result<Written, PyramidError> {
         let [first_row, first_column] = within.offset_of(area);
         let [[_, width], [_, columns]] = [within.size(), area.size()];
         let mut line: Vec<[i32; N]> = Vec::new();
+        let mut sum = 0;
         self.parts(area, |file, path, run| {
             line.clear();
             for start in run.entries.clone().step_by(columns.max(1)) {
@@ -82,7 +139,15 @@ impl<const N: usize> Plane<N> {
                 *number = number.to_le();
             }
             let bytes: &[u8] = bytemuck::cast_slice(line.as_flattened());
+            sum = crc32c::crc32c_append(sum, bytes);
             write_all_at(file, bytes, run.offset).map_err(PyramidError::io("writing", path))
+        })?;
+        let Area { rows, columns } = area;
+        Ok(Written {
+            plane: self.name.clone(),
+            area: [rows.start, columns.start, rows.end, columns.end],
+            crc32c: sum,
+            to_be_filled: false,
         })
     }
 
@@ -133,7 +198,7 @@ impl<const N: usize> Plane<N> {
         let [rows, columns] = self.blocks.shape();
         let files = |range: &std::ops::Range<i64>, count: usize| {
             let file =
-                |place: i64| (usize::try_from(place).unwrap_or(0) / FILE_SIDE).min(count - 1);
+                |place: i64| (usize::try_from(place).unwrap_or(0) / self.side).min(count - 1);
             if range.is_empty() {
                 0..0
             } else {
@@ -171,7 +236,7 @@ mod tests {
     fn rectangles_come_back_across_files() {
         let folder = tempfile::tempdir().unwrap();
         let size = [4100, 8300];
-        let plane = Plane::<2>::create(folder.path(), "a", size).unwrap();
+        let plane = Plane::<2>::create(folder.path(), "a", size, 4096).unwrap();
         let entry = |row: i64, column: i64| {
             [
                 i32::try_from(row * 10_000 + column).unwrap(),
@@ -203,9 +268,29 @@ mod tests {
     }
 
     #[test]
+    fn what_was_written_holds_until_it_is_changed() {
+        let folder = tempfile::tempdir().unwrap();
+        let plane = Plane::<1>::create(folder.path(), "a", [10, 10], 4).unwrap();
+        let area = Area::new(2..9, 3..10);
+        let put = |numbers: &[[i32; 1]]| plane.write(&area, &area, numbers).unwrap();
+        let mut written = put(&[[1]; 49]);
+        let other = Plane::<1>::create(folder.path(), "b", [10, 10], 4).unwrap();
+        assert!(plane.holds(&written) && !other.holds(&written));
+        // Void samples, all of which are filled later.
+        put(&[[77]; 49]);
+        assert!(!plane.holds(&written));
+        written.to_be_filled = true;
+        assert!(plane.holds(&written));
+        put(&[[78]; 49]);
+        assert!(!plane.holds(&written));
+        written.area[3] = 11;
+        assert!(!plane.holds(&written));
+    }
+
+    #[test]
     fn a_file_that_was_not_written_is_an_error_and_a_removed_plane_leaves_none() {
         let folder = tempfile::tempdir().unwrap();
-        let plane = Plane::<1>::create(folder.path(), "a", [10, 10]).unwrap();
+        let plane = Plane::<1>::create(folder.path(), "a", [10, 10], 4).unwrap();
         assert!(plane.read(&Area::new(3..4, 0..10)).is_err());
         plane.remove().unwrap();
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);

@@ -454,7 +454,7 @@ fn stop_at_first_shard(raster: &dyn Raster, options: &BuildOptions) {
     let cancel = AtomicBool::new(false);
     let stop = |progress: Progress| {
         if progress.stage == Stage::Write && progress.done == 1 {
-            cancel.store(true, std::sync::atomic::Ordering::Relaxed);
+            cancel.store(true, Ordering::Relaxed);
         }
     };
     let stopped = build(raster, None, options, &stop, &cancel);
@@ -470,7 +470,6 @@ fn an_interrupted_build_is_gone_on_with_to_the_same_bytes() {
     run(&field, &options("whole")).unwrap();
     stop_at_first_shard(&field, &options("resumed"));
     let building = folder.path().join("resumed.building");
-    assert!(!building.join("scratch").exists());
     // The one shard that is there is dated back: written again, it would be of today.
     let journal = fs::read_to_string(building.join("manifest/journal.jsonl")).unwrap();
     let written: ShardInfo = serde_json::from_str(journal.lines().next().unwrap()).unwrap();
@@ -479,10 +478,154 @@ fn an_interrupted_build_is_gone_on_with_to_the_same_bytes() {
         .write(true)
         .open(building.join(&written.key));
     shard.unwrap().set_modified(long_ago).unwrap();
-    run(&field, &options("resumed")).unwrap();
+    let report = run(&field, &options("resumed")).unwrap();
+    // All but some of the writing.
+    let passes = graph::passes(&field, None, false);
+    let before = passes.iter().filter(|pass| !pass.name.starts_with("write"));
+    let before: usize = before.map(|pass| pass.tasks).sum();
+    assert!(report.kept_tasks > before, "{report:?}");
     let about = fs::metadata(options("resumed").output.join(&written.key)).unwrap();
     assert_eq!(about.modified().unwrap(), long_ago);
     assert!(files_of(&options("whole").output) == files_of(&options("resumed").output));
+}
+
+/// A raster that is two tasks in most of its passes, with a hole.
+fn tall() -> Field {
+    Field::new(4300, 90, |row, column| {
+        if row.abs_diff(1500) < 200 && column > 30 {
+            f64::NAN
+        } else {
+            hills(row, column)
+        }
+    })
+}
+
+#[test]
+fn a_build_that_is_stopped_again_and_again_ends_with_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let field = tall();
+    let options = |name: &str| resumable(folder.path(), name);
+    run(&field, &options("whole")).unwrap();
+    let mut stops = 0;
+    let report = loop {
+        let cancel = AtomicBool::new(false);
+        let heard = AtomicUsize::new(0);
+        // Later each time: as soon as there is something new.
+        let stop = |progress: Progress| {
+            assert!(progress.stage != Stage::StartOver);
+            if heard.fetch_add(1, Ordering::Relaxed) == 4 + 4 * stops {
+                cancel.store(true, Ordering::Relaxed);
+            }
+        };
+        let options = BuildOptions {
+            // As many samples a block and threads as it likes.
+            threads: Some(1 + stops % 3),
+            memory_budget: (stops % 2 == 0).then_some(120 << 20),
+            ..options("stopped")
+        };
+        let ended = build(&field, None, &options, &stop, &cancel);
+        match ended {
+            Ok(report) => break report,
+            Err(error) => assert!(matches!(error, PyramidError::Interrupted), "{error}"),
+        }
+        assert!(!options.output.exists());
+        damage(folder.path(), stops);
+        stops += 1;
+    };
+    assert!(stops > 4 && report.kept_tasks > 4, "{stops} {report:?}");
+    assert!(files_of(&options("whole").output) == files_of(&options("stopped").output));
+    // And once more: there is nothing to do.
+    let again = run(&field, &options("stopped")).unwrap();
+    let report = run(&field, &options("whole")).unwrap();
+    assert!(again.unchanged && again == report);
+    let other = BuildOptions {
+        eps: Some(3.0),
+        ..options("stopped")
+    };
+    assert!(matches!(run(&field, &other), Err(PyramidError::Refused(_))));
+}
+
+/// What a crash of the machine may do: a file of a plane lost, another cut short, a journal's entry empty.
+fn damage(folder: &Path, turn: usize) {
+    let building = folder.join("stopped.building");
+    let mut found = BTreeMap::new();
+    tree(&building, "", &mut found);
+    let names: Vec<&String> = found
+        .keys()
+        .filter(|name| name.starts_with("scratch/") || name.starts_with("journal/"))
+        .collect();
+    if names.is_empty() {
+        return;
+    }
+    let pick = |number: usize| building.join(names[number * 7919 % names.len()]);
+    match turn % 4 {
+        0 => fs::remove_file(pick(turn)).unwrap(),
+        1 => fs::write(pick(turn), [0; 40]).unwrap(),
+        2 => fs::write(pick(turn), []).unwrap(),
+        _ => {}
+    }
+}
+
+#[test]
+fn tasks_in_any_order_that_passes_allow_write_what_a_build_writes() {
+    let folder = tempfile::tempdir().unwrap();
+    let field = tall();
+    let options = |name: &str| resumable(folder.path(), name);
+    run(&field, &options("whole")).unwrap();
+    let options = options("tasks");
+    let planned = plan_tasks(&field, None, &options).unwrap();
+    let quiet = AtomicBool::new(false);
+    let task = |number, threads| {
+        let options = BuildOptions {
+            threads: Some(threads),
+            ..options.clone()
+        };
+        run_task(&field, None, &options, number, (&|_| (), &quiet))
+    };
+    let refused = |result: Result<(), PyramidError>, what: &str| match result {
+        Err(PyramidError::Refused(told)) => assert!(told.contains(what), "{told}"),
+        other => panic!("{other:?}"),
+    };
+    refused(task(planned.len(), 1), "no task");
+    refused(task(planned.len() - 1, 1), "task 0 (read 0) has to be done");
+    refused(finish(&field, None, &options).map(|_| ()), "task 0");
+    let mut done: Vec<&PlannedTask> = Vec::new();
+    for pass in planned.chunk_by(|a, b| a.pass == b.pass) {
+        assert!(pass[0].needs.as_deref() == done.last().map(|task| task.pass.as_str()));
+        // The last first, and one of them twice.
+        for planned in pass.iter().rev().chain(pass.first()) {
+            task(planned.task, 1 + planned.task % 2).unwrap();
+        }
+        done.extend(pass);
+    }
+    assert!(
+        done.len()
+            > planned
+                .iter()
+                .filter(|task| task.pass == "settle-3")
+                .count()
+    );
+    let report = finish(&field, None, &options).unwrap();
+    assert_eq!(report.void_samples, 399 * 59);
+    assert!(files_of(&folder.path().join("whole")) == files_of(&options.output));
+    // Late ones find nothing to do.
+    task(3, 1).unwrap();
+    assert!(finish(&field, None, &options).unwrap().unchanged);
+}
+
+#[test]
+fn an_input_that_changes_is_noticed_and_nothing_is_published() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("input");
+    fs::write(&file, "a").unwrap();
+    let options = BuildOptions {
+        inputs: vec![InputStamp::of(&file).unwrap()],
+        ..resumable(folder.path(), "out")
+    };
+    fs::write(&file, "longer").unwrap();
+    let changed = run(&Field::new(60, 70, hills), &options);
+    assert!(matches!(changed, Err(PyramidError::Changed(path)) if path == file));
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
 #[test]
@@ -528,7 +671,7 @@ fn a_build_stops_at_the_next_block_of_a_level() {
     let stop = |progress: Progress| {
         heard.lock().unwrap().push(progress);
         if progress.stage == Stage::Fit && progress.done == 1 {
-            cancel.store(true, std::sync::atomic::Ordering::Relaxed);
+            cancel.store(true, Ordering::Relaxed);
         }
     };
     let stopped = build(&Field::new(700, 421, hills), None, &options, &stop, &cancel);

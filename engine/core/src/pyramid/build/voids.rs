@@ -14,11 +14,14 @@
 use std::path::Path;
 
 use super::area::{Area, Blocks, to_signed};
-use super::options::Watch;
+use super::journal::Made;
 use super::passes::in_order;
-use super::planes::SamplePlane;
+use super::planes::{SamplePlane, TASK_SIDE};
 use super::samples::Samples;
+use super::scratch::Written;
+use super::tasks::{Job, Tasks};
 use crate::pyramid::PyramidError;
+use crate::pyramid::files::unique;
 
 /// Sweeps on each plane, two halves each.
 const SWEEPS: usize = 8;
@@ -27,38 +30,161 @@ const HALO: usize = 2 * SWEEPS;
 
 /// How gaps are filled.
 pub(super) struct Gaps<'a> {
-    /// Where the halved planes are made, and removed.
+    /// Where the halved planes are made.
     pub(super) scratch: &'a Path,
     /// Samples a side of a block.
     pub(super) side: usize,
-    /// Asked before every block whether to go on.
-    pub(super) watch: &'a Watch<'a>,
+    /// Planes of more samples are halved and filled by many tasks, the others by one.
+    pub(super) task_samples: u64,
+    /// Does them.
+    pub(super) tasks: &'a Tasks<'a>,
+}
+
+/// The sizes of the halved planes that are made by many tasks.
+pub(super) fn halved(data: [usize; 2], task_samples: u64) -> Vec<[usize; 2]> {
+    let sizes = std::iter::successors(Some(data), |size| Some(half(*size)));
+    let large = |size: &[usize; 2]| (size[0] * size[1]) as u64 > task_samples;
+    sizes.take_while(large).map(half).collect()
+}
+
+fn half(size: [usize; 2]) -> [usize; 2] {
+    size.map(|count| count.div_ceil(2))
 }
 
 impl Gaps<'_> {
-    /// Fills the void samples of the first rows and columns of a plane, of which some are known.
-    pub(super) fn fill(&self, finest: &SamplePlane, data: [usize; 2]) -> Result<(), PyramidError> {
+    /// Fills the void samples of the first rows and columns of a plane, of which some are known, if there are any.
+    pub(super) fn fill(
+        &self,
+        finest: &SamplePlane,
+        data: [usize; 2],
+        gaps: bool,
+    ) -> Result<(), PyramidError> {
+        // Of each plane that is to be filled its size, and whether it has gaps.
+        let mut fine = vec![(data, gaps)];
+        let mut planes = Vec::<SamplePlane>::new();
+        for (number, half) in halved(data, self.task_samples).into_iter().enumerate() {
+            let (size, gaps) = fine[number];
+            let coarse = SamplePlane::create(self.scratch, &format!("void-{number}"), half)?;
+            let pass = format!("pull-{number}");
+            let left = self.pass(&pass, half, self.side / 2, (&coarse, gaps), |area| {
+                self.pull(planes.last().unwrap_or(finest), size, &coarse, area)
+            })?;
+            planes.push(coarse);
+            fine.push((half, left));
+        }
+        let top = planes.last().unwrap_or(finest);
+        if let Some((size, gaps)) = fine.pop() {
+            self.fill_small(top, size, gaps)?;
+        }
+        while let (Some(coarser), Some((size, gaps))) = (planes.pop(), fine.pop()) {
+            let plane = planes.last().unwrap_or(finest);
+            let pass = format!("fill-{}", planes.len());
+            self.pass(&pass, size, self.side, (plane, gaps), |area| {
+                self.push(plane, size, &coarser, area)
+            })?;
+        }
+        Ok(())
+    }
+
+    /// A pass over a plane, or nothing where there are no gaps. True where gaps are left.
+    fn pass(
+        &self,
+        name: &str,
+        size: [usize; 2],
+        side: usize,
+        (plane, gaps): (&SamplePlane, bool),
+        work: impl Fn(&Area) -> Result<Made<bool>, PyramidError> + Sync,
+    ) -> Result<bool, PyramidError> {
+        let job = Job {
+            pass: name,
+            planes: &[plane],
+            in_turn: false,
+            advance: &|_| Ok(()),
+        };
+        let parts = Blocks::new(size, TASK_SIDE);
+        let blocks = |task| {
+            if gaps {
+                parts.area(task).blocks(side)
+            } else {
+                Vec::new()
+            }
+        };
+        let made = self
+            .tasks
+            .run(&job, blocks, |area| work(&area), |a, b| a | b)?;
+        Ok(made.found)
+    }
+
+    /// Fills a plane that is one task.
+    fn fill_small(
+        &self,
+        plane: &SamplePlane,
+        size: [usize; 2],
+        gaps: bool,
+    ) -> Result<(), PyramidError> {
+        let job = Job {
+            pass: "gaps",
+            planes: &[plane],
+            in_turn: false,
+            advance: &|_| Ok(()),
+        };
+        let once = |_| if gaps { vec![()] } else { Vec::new() };
+        let work = |()| Ok(Made::new((), self.fill_alone(plane, size)?));
+        self.tasks.run(&job, once, work, |(), ()| ())?;
+        Ok(())
+    }
+
+    /// The same for any plane, by itself.
+    fn fill_alone(
+        &self,
+        finest: &SamplePlane,
+        data: [usize; 2],
+    ) -> Result<Vec<Written>, PyramidError> {
+        // Another process may do the same.
+        let own = unique();
         let mut planes = Vec::<SamplePlane>::new();
         let mut size = data;
         loop {
-            let name = format!("void-{}", planes.len());
-            let half = size.map(|count| count.div_ceil(2));
-            let coarse = SamplePlane::create(self.scratch, &name, half)?;
-            let gaps = self.pull(planes.last().unwrap_or(finest), size, &coarse)?;
+            let name = format!("gaps-{own}-{}", planes.len());
+            let coarse = SamplePlane::create(self.scratch, &name, half(size))?;
+            let gaps = self.each(half(size), self.side / 2, |area| {
+                self.pull(planes.last().unwrap_or(finest), size, &coarse, area)
+            })?;
             planes.push(coarse);
-            size = half;
-            if !gaps {
+            size = half(size);
+            if !gaps.found {
                 break;
             }
         }
+        let mut written = Vec::new();
         while let Some(coarser) = planes.pop() {
-            match planes.last() {
-                Some(plane) => self.push(plane, plane.size(), &coarser)?,
-                None => self.push(finest, data, &coarser)?,
-            }
+            let (plane, size) = match planes.last() {
+                Some(plane) => (plane, plane.size()),
+                None => (finest, data),
+            };
+            written = self
+                .each(size, self.side, |area| {
+                    self.push(plane, size, &coarser, area)
+                })?
+                .written;
             coarser.remove()?;
         }
-        Ok(())
+        Ok(written)
+    }
+
+    /// Does all blocks of a plane.
+    fn each(
+        &self,
+        size: [usize; 2],
+        side: usize,
+        work: impl Fn(&Area) -> Result<Made<bool>, PyramidError> + Sync + Send,
+    ) -> Result<Made<bool>, PyramidError> {
+        let blocks = Blocks::new(size, side);
+        let block = |index| {
+            self.tasks.watch.check()?;
+            work(&blocks.area(index))
+        };
+        in_order(blocks.count(), block, |a, b| a.and(b, |a, b| a | b))
     }
 
     /// Halves a plane: the mean of the known finer cells, a gap where no finer cell is known. True where gaps are left.
@@ -67,50 +193,40 @@ impl Gaps<'_> {
         fine: &SamplePlane,
         fine_size: [usize; 2],
         coarse: &SamplePlane,
-    ) -> Result<bool, PyramidError> {
-        let blocks = Blocks::new(coarse.size(), self.side / 2);
-        let block = |index| {
-            self.watch.check()?;
-            let area = blocks.area(index);
-            let double = |range: &std::ops::Range<i64>| 2 * range.start..2 * range.end;
-            let below = Area {
-                rows: double(&area.rows),
-                columns: double(&area.columns),
-            };
-            let mean = mean_of_known(&fine.read(&below.and(&Area::whole(fine_size)))?, &area);
-            coarse.write(&area, &mean)?;
-            Ok(mean.voids.is_some())
+        area: &Area,
+    ) -> Result<Made<bool>, PyramidError> {
+        let double = |range: &std::ops::Range<i64>| 2 * range.start..2 * range.end;
+        let below = Area {
+            rows: double(&area.rows),
+            columns: double(&area.columns),
         };
-        in_order(blocks.count(), block, |a, b| a | b)
+        let mean = mean_of_known(&fine.read(&below.and(&Area::whole(fine_size)))?, area);
+        let written = coarse.write_unfilled(&mean)?;
+        Ok(Made::new(mean.voids.is_some(), [written]))
     }
 
-    /// Fills the gaps of a plane's first rows and columns from a filled coarser plane.
+    /// Fills the gaps of a block of a plane's first rows and columns from a filled coarser plane.
     fn push(
         &self,
         plane: &SamplePlane,
         size: [usize; 2],
         coarser: &SamplePlane,
-    ) -> Result<(), PyramidError> {
-        let blocks = Blocks::new(size, self.side);
-        let block = |index| {
-            self.watch.check()?;
-            let area = blocks.area(index);
-            if plane.read(&area)?.voids.is_none() {
-                return Ok(());
-            }
-            let halo = area.grown([HALO, HALO]).and(&Area::whole(size));
-            let mut window = plane.read(&halo)?;
-            let half = |range: &std::ops::Range<i64>| range.start / 2..(range.end - 1) / 2 + 1;
-            let above = Area {
-                rows: half(&halo.rows),
-                columns: half(&halo.columns),
-            };
-            let above = above.grown([1, 1]).and(&Area::whole(coarser.size()));
-            start(&mut window, &coarser.read(&above)?);
-            relax(&mut window);
-            plane.write(&area, &window)
+        area: &Area,
+    ) -> Result<Made<bool>, PyramidError> {
+        if plane.read(area)?.voids.is_none() {
+            return Ok(Made::default());
+        }
+        let halo = area.grown([HALO, HALO]).and(&Area::whole(size));
+        let mut window = plane.read(&halo)?;
+        let half = |range: &std::ops::Range<i64>| range.start / 2..(range.end - 1) / 2 + 1;
+        let above = Area {
+            rows: half(&halo.rows),
+            columns: half(&halo.columns),
         };
-        in_order(blocks.count(), block, |(), ()| ())
+        let above = above.grown([1, 1]).and(&Area::whole(coarser.size()));
+        start(&mut window, &coarser.read(&above)?);
+        relax(&mut window);
+        Ok(Made::new(false, [plane.write(area, &window)?]))
     }
 }
 
@@ -206,6 +322,8 @@ fn mean(sum: i64, count: i64) -> i32 {
 mod tests {
     use std::sync::atomic::AtomicBool;
 
+    use super::super::options::Watch;
+    use super::super::tasks::Pass;
     use super::*;
 
     fn filled(side: usize, block: usize, height: impl Fn(usize, usize) -> Option<i32>) -> Samples {
@@ -220,14 +338,36 @@ mod tests {
             }
         }
         plane.write(&all, &samples).unwrap();
-        let cancel = AtomicBool::new(false);
-        let gaps = Gaps {
-            scratch: folder.path(),
-            side: block,
-            watch: &Watch::new(&|_| (), &cancel),
-        };
-        gaps.fill(&plane, [side, side]).unwrap();
+        fill(&plane, folder.path(), [block, side * side], false).unwrap();
         plane.read(&all).unwrap()
+    }
+
+    /// Fills a plane in blocks of a side, planes of more than some samples by a pass of their own.
+    fn fill(
+        plane: &SamplePlane,
+        folder: &Path,
+        [side, task_samples]: [usize; 2],
+        cancel: bool,
+    ) -> Result<(), PyramidError> {
+        let cancel = AtomicBool::new(cancel);
+        let watch = Watch::new(&|_| (), &cancel);
+        let mut tasks = Tasks::of_pass("gaps", 1, folder, &watch);
+        for number in 0..20 {
+            tasks.passes.extend(["pull", "fill"].map(|what| Pass {
+                name: format!("{what}-{number}"),
+                tasks: 1,
+                samples: 0,
+                reads: Vec::new(),
+                writes: Vec::new(),
+            }));
+        }
+        let gaps = Gaps {
+            scratch: folder,
+            side,
+            task_samples: task_samples as u64,
+            tasks: &tasks,
+        };
+        gaps.fill(plane, plane.size(), true)
     }
 
     fn slope(row: usize, column: usize) -> i32 {
@@ -270,16 +410,39 @@ mod tests {
     }
 
     #[test]
+    fn passes_and_one_task_fill_the_same_and_go_on_with_what_is_filled() {
+        let folder = tempfile::tempdir().unwrap();
+        let rough = |row: i32, column: i32| row * row % 97 + 3 * column;
+        let mut samples = Samples::new(Area::whole([129, 129]), vec![0; 129 * 129]);
+        for (row, column) in (0..129).flat_map(|row| (0..129).map(move |c| (row, c))) {
+            if hole(row, column) {
+                samples.set_void(row, column);
+            } else {
+                let [row, column] = [row, column].map(|at| i32::try_from(at).unwrap());
+                samples.values[samples.columns * row.unsigned_abs() as usize
+                    + column.unsigned_abs() as usize] = rough(row, column);
+            }
+        }
+        let filled = [129 * 129, 1000, 1].map(|task_samples| {
+            let folder = folder.path().join(task_samples.to_string());
+            let plane = SamplePlane::create(&folder, "a", [129, 129]).unwrap();
+            plane.write(&samples.area, &samples).unwrap();
+            // What was filled before is started from again.
+            for _ in 0..2 {
+                fill(&plane, &folder, [32, task_samples], false).unwrap();
+            }
+            std::fs::remove_dir_all(folder.join("journal")).unwrap();
+            fill(&plane, &folder, [32, task_samples], false).unwrap();
+            plane.read(&samples.area).unwrap()
+        });
+        assert!(filled[0] == filled[1] && filled[1] == filled[2] && filled[0] != samples);
+    }
+
+    #[test]
     fn whoever_cancels_is_heard_before_the_first_block() {
         let folder = tempfile::tempdir().unwrap();
         let plane = SamplePlane::create(folder.path(), "never written", [9, 9]).unwrap();
-        let cancel = AtomicBool::new(true);
-        let gaps = Gaps {
-            scratch: folder.path(),
-            side: 4,
-            watch: &Watch::new(&|_| (), &cancel),
-        };
-        let stopped = gaps.fill(&plane, [9, 9]);
+        let stopped = fill(&plane, folder.path(), [4, 1], true);
         assert!(matches!(stopped, Err(PyramidError::Interrupted)));
     }
 

@@ -56,9 +56,9 @@ fn written_with(level: u8, change: impl Fn(&mut Bytes) + Sync) -> (tempfile::Tem
         );
     }
     let texels = |id: TileId| pyramid.read_color(id);
-    shards.push(
+    shards.extend(
         writer
-            .write_color_shard(0, [1, 1], [0, 0], &texels)
+            .write_color_shard(crate::pyramid::ColorCodec::Zstd, 0, [1, 1], [0, 0], &texels)
             .unwrap(),
     );
     writer.publish(metadata, &shards).unwrap();

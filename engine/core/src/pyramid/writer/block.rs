@@ -12,7 +12,9 @@ use crate::{
     geo::TileId,
     pyramid::{
         PyramidError,
-        shard::{SHARD_TILES, ShardIndex, encode_image, encode_record, shard_shape, z_order},
+        shard::{
+            SHARD_TILES, ShardIndex, encode_image, encode_jpeg, encode_record, shard_shape, z_order,
+        },
     },
 };
 
@@ -28,8 +30,17 @@ pub(super) struct Block {
     pub(super) tiles: [u32; 2],
     pub(super) shard: [u32; 2],
     pub(super) chunk_bytes: usize,
-    /// Lengths of a record's parts; none for imagery.
-    pub(super) sections: Vec<usize>,
+    pub(super) packing: Packing,
+}
+
+/// How a tile's bytes become a chunk.
+pub(super) enum Packing {
+    /// A record, of parts of these lengths.
+    Record(Vec<usize>),
+    /// Whatever, compressed whole.
+    Whole,
+    /// RGBA texels, as JPEG of a quality.
+    Jpeg(u8),
 }
 
 impl Block {
@@ -82,10 +93,10 @@ impl Block {
             "bytes of a chunk of level {}",
             self.level
         );
-        let chunk = if self.sections.is_empty() {
-            encode_image(&bytes)
-        } else {
-            encode_record(&bytes, &self.sections)
+        let chunk = match &self.packing {
+            Packing::Record(sections) => encode_record(&bytes, sections),
+            Packing::Whole => encode_image(&bytes),
+            Packing::Jpeg(quality) => encode_jpeg(&bytes, *quality),
         };
         chunk
             .map(Some)

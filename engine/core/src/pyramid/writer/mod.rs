@@ -5,6 +5,7 @@
 //!                 manifest/journal.jsonl    a line a finished shard
 //!                 tile/…, color/…           shards, each written whole
 //!                 scratch/…                 what passes of the build leave for each other
+//!                 journal/…                 and what each of them has done
 //! publish:        array metadata, manifest, the root zarr.json, then the folder becomes OUT
 //! ```
 //!
@@ -27,15 +28,16 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use self::{
-    block::Block,
+    block::{Block, Packing},
     place::{claim, remove_if_there, settle_replacement, start_over},
 };
 use super::{
-    COLOR_TEXELS, Metadata, PyramidError, RecordLayout,
-    files::{remove_folder, sibling, sync_folder, write_whole, write_whole_with},
+    COLOR_TEXELS, ColorCodec, Metadata, PyramidError, RecordLayout,
+    files::{remove_folder, sibling, sync_folder, unique, write_whole, write_whole_as},
     shard::shard_count,
     zarr,
 };
+use crate::geo::TileId;
 
 pub use block::Contents;
 pub(super) use place::check_target;
@@ -46,6 +48,8 @@ const MARKER: &str = "unfinished";
 const JOURNAL: &str = "manifest/journal.jsonl";
 /// What passes of the build leave for each other.
 const SCRATCH: &str = "scratch";
+/// What passes of the build have done.
+const PASSES: &str = "journal";
 /// One line a shard, when done.
 pub(super) const MANIFEST: &str = "manifest/shards.jsonl";
 
@@ -73,6 +77,8 @@ pub struct PyramidWriter {
     journal: Mutex<File>,
     /// What an earlier, interrupted run of the same build wrote.
     kept: HashMap<String, ShardInfo>,
+    /// What an earlier run of another build wrote is thrown away.
+    started_over: bool,
 }
 
 impl PyramidWriter {
@@ -100,27 +106,66 @@ impl PyramidWriter {
         let mut marker = claim(&folder)?;
         let found = std::io::read_to_string(&marker)
             .map_err(PyramidError::io("reading", folder.join(MARKER)))?;
-        let kept = if fingerprint.is_empty() || found != fingerprint {
+        let other = fingerprint.is_empty() || found != fingerprint;
+        if other {
             start_over(&folder, &mut marker, fingerprint)?;
-            HashMap::new()
-        } else {
-            read_journal(&folder)?
-        };
+        }
+        Ok(Self {
+            started_over: other && !found.is_empty(),
+            ..Self::open(path, overwrite, marker)?
+        })
+    }
+
+    /// Takes part in a build of a `fingerprint` that [`Self::resume`] has begun, beside others, or `alone` when they are
+    /// done.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::create`]; refused where no such build is there, or others are at work.
+    pub fn join(
+        path: &Path,
+        overwrite: bool,
+        fingerprint: &str,
+        alone: bool,
+    ) -> Result<Self, PyramidError> {
+        check_target(path, overwrite)?;
+        let folder = sibling(path, ".building");
+        let marker = place::join(&folder, alone)?;
+        let found = std::io::read_to_string(&marker)
+            .map_err(PyramidError::io("reading", folder.join(MARKER)))?;
+        if found != fingerprint {
+            return Err(PyramidError::Refused(format!(
+                "{}: is of other inputs or options, or by another version; plan it again",
+                folder.display()
+            )));
+        }
+        Self::open(path, overwrite, marker)
+    }
+
+    fn open(path: &Path, overwrite: bool, marker: File) -> Result<Self, PyramidError> {
+        let folder = sibling(path, ".building");
+        let kept = read_journal(&folder)?;
         let journal_path = folder.join(JOURNAL);
         let journal = File::options()
             .append(true)
             .create(true)
             .open(&journal_path)
             .map_err(PyramidError::io("opening", journal_path))?;
-        let target = path.into();
         Ok(Self {
-            target,
+            target: path.into(),
             folder,
             overwrite,
             _marker: marker,
             journal: Mutex::new(journal),
             kept,
+            started_over: false,
         })
+    }
+
+    /// True where what an earlier run of another build had left was thrown away.
+    #[must_use]
+    pub const fn started_over(&self) -> bool {
+        self.started_over
     }
 
     /// Writes the records of one level's 32 × 32 block of tiles: row and column `shard` of its shards.
@@ -145,33 +190,50 @@ impl PyramidWriter {
             tiles,
             shard,
             chunk_bytes: layout.byte_count(),
-            sections: layout.sections(),
+            packing: Packing::Record(layout.sections()),
         };
         self.write_block(key, &block, records)
     }
 
-    /// Writes one block of a level's imagery: RGBA texels, 256 × 256 a tile, row by row from the north-west.
+    /// Writes one block of a level's imagery: RGBA texels, 256 × 256 a tile, row by row from the north-west. There are
+    /// two shards where the codec stores alpha apart; `texels` is then asked twice.
     ///
     /// # Errors
     ///
     /// As [`Self::write_shard`].
     pub fn write_color_shard(
         &self,
+        codec: ColorCodec,
         level: u8,
         tiles: [u32; 2],
         shard: [u32; 2],
         texels: Contents<'_>,
-    ) -> Result<ShardInfo, PyramidError> {
-        let key = zarr::shard_key(&format!("color/{level}"), shard, 3);
-        let chunk_bytes = COLOR_TEXELS * COLOR_TEXELS * 4;
-        let block = Block {
+    ) -> Result<Vec<ShardInfo>, PyramidError> {
+        let block = |chunk_bytes, packing| Block {
             level,
             tiles,
             shard,
             chunk_bytes,
-            sections: Vec::new(),
+            packing,
         };
-        self.write_block(key, &block, texels)
+        let key = zarr::shard_key(&format!("color/{level}"), shard, 3);
+        let count = COLOR_TEXELS * COLOR_TEXELS;
+        let ColorCodec::Jpeg { quality } = codec else {
+            let written = self.write_block(key, &block(4 * count, Packing::Whole), texels)?;
+            return Ok(vec![written]);
+        };
+        let alpha = |tile: TileId| {
+            let alpha = texels(tile)?.map(|texels| {
+                let alpha = texels.as_chunks::<4>().0.iter().map(|texel| texel[3]);
+                alpha.collect::<Vec<u8>>()
+            });
+            Ok(alpha.filter(|alpha| alpha.iter().any(|alpha| *alpha < u8::MAX)))
+        };
+        let alpha_key = zarr::shard_key(&format!("alpha/{level}"), shard, 2);
+        Ok(vec![
+            self.write_block(key, &block(4 * count, Packing::Jpeg(quality)), texels)?,
+            self.write_block(alpha_key, &block(count, Packing::Whole), &alpha)?,
+        ])
     }
 
     /// Writes one block of the features' records, each of `record_bytes`; tiles without a feature have none.
@@ -193,17 +255,28 @@ impl PyramidWriter {
             tiles,
             shard,
             chunk_bytes: record_bytes as usize,
-            sections: Vec::new(),
+            packing: Packing::Whole,
         };
         self.write_block(key, &block, records)
     }
 
-    /// The folder for what passes of the build leave for each other. Nothing in it outlives the run: whoever fills it
-    /// removes it when the run ends, however it does, and when it starts, for runs that were killed;
-    /// [`Self::publish`] leaves none.
+    /// The folder for what passes of the build leave for each other; it goes with what is started over, and when the
+    /// pyramid is published.
     #[must_use]
     pub fn scratch(&self) -> PathBuf {
         self.folder.join(SCRATCH)
+    }
+
+    /// The folder for what passes of the build have done, kept and removed with [`Self::scratch`].
+    #[must_use]
+    pub fn journal(&self) -> PathBuf {
+        self.folder.join(PASSES)
+    }
+
+    /// The folder of what is being built.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// Writes array metadata, manifest and root, and gives the pyramid its name.
@@ -220,10 +293,11 @@ impl PyramidWriter {
         check_complete(metadata, shards).map_err(invalid)?;
         self.write_nodes(metadata)?;
         self.write_manifest(shards)?;
-        remove_if_there(&self.folder.join(JOURNAL))?;
-        remove_folder(&self.scratch())?;
         let root = zarr::root_json(metadata).map_err(|error| invalid(error.to_string()))?;
         write_whole(&self.folder.join(zarr::NODE), &root)?;
+        remove_if_there(&self.folder.join(JOURNAL))?;
+        remove_folder(&self.scratch())?;
+        remove_folder(&self.journal())?;
         remove_if_there(&self.folder.join(MARKER))?;
         sync_folder(&self.folder)?;
         self.take_name()
@@ -246,13 +320,15 @@ impl PyramidWriter {
     ) -> Result<ShardInfo, PyramidError> {
         let path = self.folder.join(&key);
         if let Some(kept) = self.kept.get(&key)
-            && file_hash(&path)
-                .is_ok_and(|(bytes, hash)| bytes == kept.bytes && hash == kept.blake3)
+            && holds(&self.folder, kept)
         {
             return Ok(kept.clone());
         }
         let mut chunks = 0;
-        write_whole_with(&path, |file| {
+        // Under a name of its own, and not beside it: another process may write the same, and what a killed one leaves
+        // goes with the scratch.
+        let partial = self.scratch().join(format!("shard-{}", unique()));
+        write_whole_as(&path, &partial, |file| {
             chunks = block.write(file, &path, contents)?;
             Ok(())
         })?;
@@ -356,13 +432,24 @@ pub(super) fn shard_keys(metadata: &Metadata) -> impl Iterator<Item = String> {
             })
         })
     };
-    let color_levels = metadata.color.as_ref().map_or(0, |color| color.levels);
+    let color = metadata.color.as_ref();
+    let color_levels = color.map_or(0, |color| color.levels);
+    let alpha_levels = color
+        .filter(|color| color.codec != ColorCodec::Zstd)
+        .map_or(0, |color| color.levels);
     let features = metadata
         .features
         .map_or(0..0, |features| features.level..features.level + 1);
     arrays("tile", 0..metadata.grid.level_count(), 1)
         .chain(arrays("feature", features, 1))
         .chain(arrays("color", 0..color_levels, 3))
+        .chain(arrays("alpha", 0..alpha_levels, 2))
+}
+
+/// True for a shard that is there as it was written.
+pub(super) fn holds(folder: &Path, info: &ShardInfo) -> bool {
+    file_hash(&folder.join(&info.key))
+        .is_ok_and(|(bytes, hash)| bytes == info.bytes && hash == info.blake3)
 }
 
 /// Size and BLAKE3 of a file.

@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use super::{MARKER, SCRATCH};
+use super::{MARKER, PASSES, SCRATCH};
 use crate::pyramid::{
     PyramidError,
     files::{remove_folder, sibling},
@@ -85,13 +85,35 @@ pub(super) fn claim(folder: &Path) -> Result<File, PyramidError> {
     }
 }
 
+/// The marker of a build that was begun, locked together with others, or against all others.
+pub(super) fn join(folder: &Path, alone: bool) -> Result<File, PyramidError> {
+    let marker = folder.join(MARKER);
+    let refused = |what: &str| PyramidError::Refused(format!("{}: {what}", folder.display()));
+    let file = match File::options().read(true).write(true).open(&marker) {
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            return Err(refused("no build was begun here; plan it first"));
+        }
+        other => other.map_err(PyramidError::io("opening", &marker))?,
+    };
+    let locked = if alone {
+        file.try_lock()
+    } else {
+        file.try_lock_shared()
+    };
+    match locked {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(refused("another process is building this pyramid")),
+        Err(TryLockError::Error(error)) => Err(PyramidError::io("locking", marker)(error)),
+    }
+}
+
 /// Empties a build's folder and says what is being built now.
 pub(super) fn start_over(
     folder: &Path,
     marker: &mut File,
     fingerprint: &str,
 ) -> Result<(), PyramidError> {
-    for name in ["tile", "feature", "color", "manifest", SCRATCH] {
+    for name in ["tile", "feature", "color", "manifest", SCRATCH, PASSES] {
         remove_folder(&folder.join(name))?;
     }
     remove_if_there(&folder.join(zarr::NODE))?;

@@ -30,6 +30,7 @@ use self::layers::{Layer, Layers};
 use self::slots::Slots;
 use super::options::{Imagery, Stage, Watch};
 use crate::geo::{Grid, TileId};
+use crate::pyramid::files::unique;
 use crate::pyramid::{
     COLOR_TEXELS, ColorMetadata, PyramidError, PyramidWriter, SHARD_TILES, ShardInfo, shard_count,
 };
@@ -54,7 +55,8 @@ pub(super) fn write(
         .map(tiles)
         .map(|[rows, columns]| 2 * rows * columns);
     let advance = watch.stage(Stage::Color, total.sum::<u64>() * COLOR_TEXELS as u64);
-    let scratch = writer.scratch();
+    // Of its own: another process may do the same.
+    let scratch = writer.scratch().join(format!("color-{}", unique()));
     let mut infos = Vec::new();
     let mut finer: Option<Slots> = None;
     for level in (0..levels).rev() {
@@ -72,7 +74,7 @@ pub(super) fn write(
             Ok(shown.map(Vec::into_flattened))
         };
         for shard in (0..rows).flat_map(|row| (0..columns).map(move |column| [row, column])) {
-            infos.push(writer.write_color_shard(level, tiles, shard, &texels)?);
+            infos.extend(writer.write_color_shard(imagery.codec, level, tiles, shard, &texels)?);
             let inside = [0, 1]
                 .map(|axis| u64::from((tiles[axis] - shard[axis] * SHARD_TILES).min(SHARD_TILES)));
             advance(inside[0] * inside[1] * COLOR_TEXELS as u64)?;
@@ -87,6 +89,7 @@ pub(super) fn write(
         ColorMetadata {
             levels,
             texels,
+            codec: imagery.codec,
             sources: imagery.sources.clone(),
         },
         infos,

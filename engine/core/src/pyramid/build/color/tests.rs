@@ -2,6 +2,7 @@ use super::layers::samples_per_texel;
 use super::*;
 use crate::dem::Image;
 use crate::geo::{Extent, TILE_CELLS};
+use crate::pyramid::ColorCodec;
 use crate::pyramid::light::{LINEAR, encode};
 
 fn grid(rows: u32, columns: u32) -> Grid {
@@ -44,6 +45,7 @@ fn motley(row: u32, column: u32) -> [u8; 3] {
 fn imagery(images: &[Image]) -> Imagery<'_> {
     Imagery {
         images,
+        codec: ColorCodec::Zstd,
         sources: Vec::new(),
     }
 }
@@ -317,4 +319,96 @@ fn tiles_are_there_where_pictures_are() {
     };
     assert_eq!((own(3), own(2)), (vec![[0, 2], [0, 3]], vec![[0, 1]]));
     assert_eq!(own(0), [[0, 0]]);
+}
+
+/// A built pyramid of two by three finest tiles with a picture of a hole.
+fn built(codec: ColorCodec) -> (tempfile::TempDir, crate::pyramid::Pyramid) {
+    let folder = tempfile::tempdir().unwrap();
+    let raster = super::super::testing::Field::new(250, 350, |row, column| (row + column) as f64);
+    let wave = |at: u32, period: f64| 100.0 + 90.0 * (f64::from(at) / period).sin();
+    let picture = image(700, None, |row, column| {
+        let hole = row.abs_diff(300).pow(2) + column.abs_diff(200).pow(2) < 900;
+        let color = [
+            wave(row, 9.0) as u8,
+            wave(column, 5.0) as u8,
+            wave(row + column, 31.0) as u8,
+        ];
+        if hole {
+            [0; 4]
+        } else {
+            [color[0], color[1], color[2], 255]
+        }
+    });
+    let images = [picture];
+    let imagery = Imagery {
+        codec,
+        ..imagery(&images)
+    };
+    let options = super::super::BuildOptions {
+        output: folder.path().join("out.zarr"),
+        ..Default::default()
+    };
+    let cancel = std::sync::atomic::AtomicBool::new(false);
+    super::super::build(&raster, Some(&imagery), &options, &|_| (), &cancel).unwrap();
+    let report = crate::pyramid::validate(&options.output, true, &mut |_, _| ()).unwrap();
+    assert!(report.findings.is_empty(), "{:?}", report.findings);
+    let pyramid = crate::pyramid::Pyramid::open(&options.output).unwrap();
+    (folder, pyramid)
+}
+
+#[test]
+fn tiles_of_jpeg_agree_on_their_borders_at_every_level_and_keep_their_holes() {
+    let (_kept, exact) = built(ColorCodec::Zstd);
+    let (_folder, pyramid) = built(ColorCodec::Jpeg { quality: 60 });
+    let grid = pyramid.metadata().grid;
+    let read = |pyramid: &crate::pyramid::Pyramid, tile| {
+        pyramid
+            .read_color(tile)
+            .unwrap()
+            .unwrap()
+            .as_chunks::<4>()
+            .0
+            .to_vec()
+    };
+    let (mut square, mut count) = (0.0, 0.0);
+    for level in 0..pyramid.metadata().color.as_ref().unwrap().levels {
+        let [rows, columns] = grid.tiles(level);
+        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)))
+        {
+            let tile = TileId::new(level, row, column);
+            let [own, source] = [&pyramid, &exact].map(|pyramid| read(pyramid, tile));
+            for (own, source) in own.iter().zip(&source) {
+                assert_eq!(own[3], source[3]);
+                square += (0..3)
+                    .map(|at| f64::from(own[at].abs_diff(source[at])).powi(2))
+                    .sum::<f64>();
+                count += 3.0;
+            }
+            if column + 1 < columns {
+                let east = read(
+                    &pyramid,
+                    TileId {
+                        column: column + 1,
+                        ..tile
+                    },
+                );
+                assert!(
+                    (0..256).all(|at| own[at * 256 + 255] == east[at * 256]),
+                    "{tile}"
+                );
+            }
+            if row + 1 < rows {
+                let south = read(
+                    &pyramid,
+                    TileId {
+                        row: row + 1,
+                        ..tile
+                    },
+                );
+                assert!(own[255 * 256..] == south[..256], "{tile}");
+            }
+        }
+    }
+    let psnr = 10.0 * (255.0 * 255.0 * count / square).log10();
+    assert!(psnr > 30.0, "{psnr} dB");
 }

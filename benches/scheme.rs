@@ -1,9 +1,8 @@
-//! One way of giving depths, measured: its counts, and the time of its steps.
+//! One way of giving depths, measured: its counts, its memory, and the time of its steps.
 
-use std::{collections::VecDeque, hint::black_box};
+use std::hint::black_box;
 
-use anyhow::{Context as _, Result};
-use drumlin_benches::measure::{self, Timing, median_of, thread_median_of};
+use anyhow::Result;
 use drumlin_core::{
     cage::Cage,
     fas::{Blocks, Entry, PatchPattern, Positions},
@@ -11,64 +10,67 @@ use drumlin_core::{
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::errors::blocks_at;
+use crate::{
+    errors::blocks_at,
+    measure::{self, Clock, Timing, clocked_median_of, prepared_median_of},
+};
 
 /// Places along each side of a patch at which it is drawn.
 const DRAWN: u32 = 5;
 
-/// Counts of the tables, and times.
-#[derive(Serialize)]
-pub(crate) struct Scheme {
+/// Counts of the tables, bytes and times.
+#[derive(Clone, Debug, Serialize)]
+pub struct Scheme {
     /// Greatest depth of a feature.
-    pub(crate) deepest: u8,
-    /// Greatest distance from the limit.
-    pub(crate) worst_error: f64,
+    pub deepest: u8,
     /// All patches.
-    pub(crate) patches: u64,
+    pub patches: u64,
     /// Patches of levels from 2 on, and caps.
-    pub(crate) feature_patches: u64,
+    pub feature_patches: u64,
     /// Points made by refinement.
-    pub(crate) refined_points: u64,
+    pub refined_points: u64,
+    /// Bytes of tables and points, f32.
+    pub bytes: u64,
     /// On one thread, by that thread's clock.
-    pub(crate) one_thread: Times,
+    pub one_thread: Times,
     /// On all threads, by the clock on the wall.
-    pub(crate) all_threads: Times,
+    pub all_threads: Times,
 }
 
 /// Times of the steps.
-#[derive(Serialize)]
-pub(crate) struct Times {
+#[derive(Clone, Debug, Serialize)]
+pub struct Times {
     /// Giving every feature its depth.
-    pub(crate) choosing: Timing,
+    pub choosing: Timing,
     /// Laying the tables from those of depth 0.
-    pub(crate) tables: Timing,
+    pub tables: Timing,
     /// Making all points, f32.
-    pub(crate) points: Timing,
+    pub points: Timing,
     /// Evaluating all patches, f32.
-    pub(crate) drawing: Timing,
+    pub drawing: Timing,
 }
 
 impl Times {
     /// Seconds of all that comes before drawing.
-    pub(crate) fn subdivision(&self) -> f64 {
+    #[must_use]
+    pub fn subdivision(&self) -> f64 {
         self.choosing.median + self.tables.median + self.points.median
     }
 
     /// Seconds of everything.
-    pub(crate) fn total(&self) -> f64 {
+    #[must_use]
+    pub fn total(&self) -> f64 {
         self.subdivision() + self.drawing.median
     }
 }
 
-/// Measures the depths that `choose` gives; `worst_error` is theirs.
-pub(crate) fn measure(
-    cage: &Cage,
-    choose: &(impl Fn() -> Vec<u8> + Sync),
-    worst_error: f64,
-    runs: usize,
-) -> Result<Scheme> {
+/// Measures the depths that `choose` gives.
+///
+/// # Errors
+/// When the depths do not fit the cage, or the threads cannot be started.
+pub fn measure(cage: &Cage, choose: &(impl Fn() -> Vec<u8> + Sync), runs: usize) -> Result<Scheme> {
     let depths = choose();
-    let blocks = blocks_at(cage, &depths)?;
+    let mut blocks = blocks_at(cage, &depths)?;
     let (mut patches, mut feature_patches) = (0, 0);
     blocks.visit(|entry| {
         let at_feature = matches!(entry, Entry::Cap(_)) || entry.place().level > 1;
@@ -76,56 +78,58 @@ pub(crate) fn measure(
         feature_patches += u64::from(at_feature);
     });
     let deepest = blocks.features().map(|vertex| blocks.depth(vertex)).max();
+    let point_bytes = size_of::<[f32; 3]>() as u64 * u64::from(blocks.point_count());
     let all = std::thread::available_parallelism().map_or(1, usize::from);
-    let timed = |threads| measure::with_threads(threads, || times(cage, choose, threads, runs))?;
+    let refined_points = u64::from(blocks.refined_point_count());
+    let bytes = blocks.byte_count() as u64 + point_bytes;
+    let mut timed = |threads, clock| {
+        measure::with_threads(threads, || times(cage, choose, &mut blocks, clock, runs))?
+    };
     Ok(Scheme {
         deepest: deepest.unwrap_or(0),
-        worst_error,
         patches,
         feature_patches,
-        refined_points: u64::from(blocks.refined_point_count()),
-        one_thread: timed(1)?,
-        all_threads: timed(all)?,
+        refined_points,
+        bytes,
+        one_thread: timed(1, Clock::Thread)?,
+        all_threads: timed(all, Clock::Wall)?,
     })
 }
 
-/// Times the steps on the caller's pool of so many threads.
+/// Times the steps on the caller's pool.
 fn times(
     cage: &Cage,
-    choose: &(impl Fn() -> Vec<u8> + Sync),
-    threads: usize,
+    choose: &impl Fn() -> Vec<u8>,
+    blocks: &mut Blocks,
+    clock: Clock,
     runs: usize,
 ) -> Result<Times> {
-    let (choosing, depths) = timed(threads, runs, choose);
-    // Linking is the same for all depths, so it stays outside of the time: linked tables of depth 0, one a run.
+    let (choosing, depths) = clocked_median_of(clock, runs, choose);
+    // Linking is the same for all depths, so it stays outside of the time: every run begins at depth 0.
     let flat = vec![0; depths.len()];
-    let linked: Result<VecDeque<_>> = (0..=runs).map(|_| blocks_at(cage, &flat)).collect();
-    let mut linked = linked?;
-    let (tables, blocks) = timed(threads, runs, || {
-        let mut blocks = linked.pop_front().context("tables a run")?;
-        blocks.set_depths(&depths).map_err(anyhow::Error::msg)?;
-        anyhow::Ok(blocks)
-    });
-    let blocks = blocks?;
+    let (tables, laid) = prepared_median_of(
+        clock,
+        runs,
+        blocks,
+        |blocks| {
+            // It cannot fail where the depths of the counts did not.
+            let _ = blocks.set_depths(&flat);
+        },
+        |blocks| blocks.set_depths(&depths),
+    );
+    laid.map_err(anyhow::Error::msg)?;
     let narrow = cage.positions().iter().map(|at| at.map(|x| x as f32));
     let narrow: Vec<_> = narrow.collect();
-    let (points, positions) = timed(threads, runs, || Positions::new(&blocks, &narrow));
+    let mut positions = Positions::new(blocks, &narrow);
+    let (points, ()) = clocked_median_of(clock, runs, || positions.execute(blocks, &narrow));
     let pattern = PatchPattern::new(&drawn_places());
-    let (drawing, ()) = timed(threads, runs, || draw(&blocks, &positions, &pattern));
+    let (drawing, ()) = clocked_median_of(clock, runs, || draw(blocks, &positions, &pattern));
     Ok(Times {
         choosing,
         tables,
         points,
         drawing,
     })
-}
-
-fn timed<T>(threads: usize, runs: usize, work: impl FnMut() -> T) -> (Timing, T) {
-    if threads == 1 {
-        thread_median_of(runs, work)
-    } else {
-        median_of(runs, work)
-    }
 }
 
 /// Position and derivatives at the places of every patch, on the caller's pool.

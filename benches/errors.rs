@@ -15,7 +15,7 @@ use drumlin_core::{
 const SEARCH_STEPS: usize = 5;
 
 /// Distances of a cage's caps from the limit.
-pub(crate) struct Errors<'a> {
+pub struct Errors<'a> {
     cage: &'a Cage,
     limit: LimitSurface<'a>,
     /// Steps along each side of a cap between places at which it is measured.
@@ -24,26 +24,48 @@ pub(crate) struct Errors<'a> {
 }
 
 /// What one feature's caps are off by.
-pub(crate) struct FeatureErrors {
-    vertex: u32,
-    /// At depths from 1 on.
-    by_depth: Vec<f64>,
+#[derive(Clone, Debug)]
+pub struct FeatureErrors {
+    /// The feature.
+    pub vertex: u32,
+    /// At depths from `least` on.
+    pub by_depth: Vec<f64>,
+    /// The least depth it may have.
+    pub least: u8,
+}
+
+impl FeatureErrors {
+    /// The least depth at which they are within `bound`, the greatest there is where none is.
+    #[must_use]
+    pub fn depth_within(&self, bound: f64) -> u8 {
+        let above = self.by_depth.iter().take_while(|&&error| error > bound);
+        self.least + above.count().min(self.by_depth.len() - 1) as u8
+    }
+
+    /// What they are off by at a depth.
+    #[must_use]
+    pub fn at(&self, depth: u8) -> f64 {
+        let index = usize::from(depth.saturating_sub(self.least));
+        self.by_depth[index.min(self.by_depth.len() - 1)]
+    }
 }
 
 /// The least depth for each feature at which its own caps are within `bound`, its greatest where none is; one depth a
 /// vertex.
-pub(crate) fn depths_within(bound: f64, features: &[FeatureErrors], vertices: usize) -> Vec<u8> {
+#[must_use]
+pub fn depths_within(bound: f64, features: &[FeatureErrors], vertices: usize) -> Vec<u8> {
     let mut depths = vec![0; vertices];
     for feature in features {
-        let errors = &feature.by_depth;
-        let above = errors.iter().take_while(|&&error| error > bound).count();
-        depths[feature.vertex as usize] = (above + 1).min(errors.len()) as u8;
+        depths[feature.vertex as usize] = feature.depth_within(bound);
     }
     depths
 }
 
 /// A cage's tables at these depths, one a vertex.
-pub(crate) fn blocks_at(cage: &Cage, depths: &[u8]) -> Result<Blocks> {
+///
+/// # Errors
+/// When the depths do not fit the cage.
+pub fn blocks_at(cage: &Cage, depths: &[u8]) -> Result<Blocks> {
     let mut blocks = Blocks::new(cage.topology()).map_err(anyhow::Error::msg)?;
     blocks.set_depths(depths).map_err(anyhow::Error::msg)?;
     Ok(blocks)
@@ -51,7 +73,10 @@ pub(crate) fn blocks_at(cage: &Cage, depths: &[u8]) -> Result<Blocks> {
 
 impl<'a> Errors<'a> {
     /// Of a cage, all quads, at places so many steps a side apart.
-    pub(crate) fn new(cage: &'a Cage, steps: u32) -> Result<Self> {
+    ///
+    /// # Errors
+    /// When the cage has faces that are no quads.
+    pub fn new(cage: &'a Cage, steps: u32) -> Result<Self> {
         Ok(Self {
             cage,
             limit: LimitSurface::new(cage)?,
@@ -61,7 +86,10 @@ impl<'a> Errors<'a> {
     }
 
     /// The greatest distance from the limit at these depths.
-    pub(crate) fn worst(&mut self, depths: &[u8]) -> Result<f64> {
+    ///
+    /// # Errors
+    /// When the depths do not fit the cage, or its limit cannot be evaluated.
+    pub fn worst(&mut self, depths: &[u8]) -> Result<f64> {
         let blocks = blocks_at(self.cage, depths)?;
         let points = Positions::new(&blocks, self.cage.positions());
         let mut caps = Vec::new();
@@ -80,7 +108,10 @@ impl<'a> Errors<'a> {
     }
 
     /// The least depth that, given to all features, keeps the worst error within `bound`.
-    pub(crate) fn classic_depth(&mut self, bound: f64) -> Result<u8> {
+    ///
+    /// # Errors
+    /// When no depth does, or the limit cannot be evaluated.
+    pub fn classic_depth(&mut self, bound: f64) -> Result<u8> {
         for depth in 1..=MAX_DEPTH {
             let worst = self.worst(&vec![depth; self.cage.positions().len()])?;
             if worst <= bound {
@@ -91,7 +122,8 @@ impl<'a> Errors<'a> {
     }
 
     /// What every feature's own caps are off by at depths from 1 to `deepest`, all of which were measured before.
-    pub(crate) fn by_feature(&self, blocks: &Blocks, deepest: u8) -> Vec<FeatureErrors> {
+    #[must_use]
+    pub fn by_feature(&self, blocks: &Blocks, deepest: u8) -> Vec<FeatureErrors> {
         let topology = self.cage.topology();
         let of_cap = |corner: u32, level: u8| {
             let [u, v] = [[0, 0], [1, 0], [1, 1], [0, 1]][topology.corner_place(corner)];
@@ -106,6 +138,7 @@ impl<'a> Errors<'a> {
         };
         let of_feature = |vertex: u32| FeatureErrors {
             vertex,
+            least: 1,
             by_depth: (1..=deepest)
                 .map(|depth| {
                     let corners = topology.vertex_corners(vertex).iter();
@@ -166,7 +199,8 @@ impl<'a> Errors<'a> {
 }
 
 /// The mean length of a cage's edges.
-pub(crate) fn mean_edge_length(cage: &Cage) -> f64 {
+#[must_use]
+pub fn mean_edge_length(cage: &Cage) -> f64 {
     let (topology, positions) = (cage.topology(), cage.positions());
     let length = |edge: u32| {
         let [a, b] = topology.edge_vertices(edge);
