@@ -16,6 +16,7 @@ mod layers;
 mod pack;
 mod picture;
 mod refine;
+mod serve;
 mod shared_structs;
 mod support;
 mod synth;

@@ -17,6 +17,7 @@ mod interrupt;
 mod pack;
 mod plan;
 mod progress;
+mod serve;
 mod sources;
 mod synth;
 mod validate;
@@ -82,6 +83,9 @@ enum Verb {
     /// Makes a folder of a pyramid's archive again
     #[command(after_help = EXIT_CODES)]
     Unpack(pack::UnpackArguments),
+    /// Serves a pyramid's files over HTTP, with ranges, on this machine alone unless told otherwise
+    #[command(after_help = EXIT_CODES)]
+    Serve(serve::Arguments),
     /// Makes an elevation model: endless mountains, a function of a seed, the same on every machine
     #[command(after_help = EXIT_CODES)]
     Synth(synth::Arguments),
@@ -113,6 +117,7 @@ fn main() -> ExitCode {
         Verb::Export(arguments) => export::run(&arguments),
         Verb::Pack(arguments) => pack::run_pack(&arguments),
         Verb::Unpack(arguments) => pack::run_unpack(&arguments),
+        Verb::Serve(arguments) => serve::run(&arguments),
         Verb::Synth(arguments) => synth::run(&arguments),
         Verb::View(arguments) => viewer::run("view", &arguments),
         Verb::Fly(arguments) => viewer::run("fly", &arguments),
