@@ -12,10 +12,11 @@ pub(crate) fn key(path: &str) -> Option<String> {
     let known = match parts[..] {
         ["zarr.json"]
         | ["manifest", "shards.jsonl"]
-        | ["tile" | "feature" | "color", "zarr.json"] => true,
-        ["tile" | "feature" | "color", level, "zarr.json"] => is_number(level),
+        | ["tile" | "feature" | "color" | "alpha", "zarr.json"] => true,
+        ["tile" | "feature" | "color" | "alpha", level, "zarr.json"] => is_number(level),
         ["tile" | "feature", level, "c", row, column, "0"]
-        | ["color", level, "c", row, column, "0", "0", "0"] => {
+        | ["color", level, "c", row, column, "0", "0", "0"]
+        | ["alpha", level, "c", row, column, "0", "0"] => {
             [level, row, column].into_iter().all(is_number)
         }
         _ => false,
@@ -43,6 +44,7 @@ mod tests {
             "/tile/5/c/0/12/0",
             "/feature/5/c/4294967295/0/0",
             "/color/0/c/0/0/0/0/0",
+            "/alpha/0/c/0/0/0/0",
         ] {
             assert_eq!(key(path).as_deref(), path.strip_prefix('/'));
         }
